@@ -1,0 +1,33 @@
+"""Flight dynamics of a ducted side-by-side helicopter: blade-element model, trim, simulation.
+
+Works without ROS; the ROS 2 nodes are in `sbs_sim.nodes`.
+
+>>> from sbs_sim import Aircraft, trim, simulate
+>>> aircraft = Aircraft.load("sbs")
+>>> hover = trim(aircraft)
+>>> flight = simulate(aircraft, hover, hover.controls, duration=1.0)
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sbs_sim.aircraft import Aircraft
+    from sbs_sim.analysis.trim import TrimPoint, trim
+    from sbs_sim.simulation import Simulation, simulate
+
+_HOME = {
+    "Aircraft": "sbs_sim.aircraft",
+    "TrimPoint": "sbs_sim.analysis.trim",
+    "trim": "sbs_sim.analysis.trim",
+    "Simulation": "sbs_sim.simulation",
+    "simulate": "sbs_sim.simulation",
+}
+__all__ = ["Aircraft", "Simulation", "TrimPoint", "simulate", "trim"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the public names when they are first used: the compiler behind them takes its time."""
+    if name in _HOME:
+        return getattr(importlib.import_module(_HOME[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

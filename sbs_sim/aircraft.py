@@ -1,0 +1,531 @@
+"""Aircraft files: YAML to checked, frozen dataclasses to the flat arrays of the model.
+
+The keys of a file, their types and plain ranges are in config/aircraft.schema.json (which editors can use); what
+concerns several values at once is checked here.
+"""
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.errors import AircraftError
+from sbs_sim.model import params as P
+from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells, read_table
+from sbs_sim.model.frames import hub_axes
+from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES, StateLayout
+
+Array = NDArray[np.float64]
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Environment:
+    """Air and gravity: density [kg/m^3], kinematic viscosity [m^2/s], gravity [m/s^2]."""
+
+    air_density: float
+    kinematic_viscosity: float
+    gravity: float
+
+
+@dataclass(frozen=True)
+class Body:
+    """The whole aircraft, blades included.
+
+    Attributes
+    ----------
+    mass : float
+        [kg]
+    inertia : ndarray, shape (3, 3)
+        About the c.g., body axes, the matrix itself [kg m^2].
+    flat_plate_areas : ndarray, shape (3,)
+        Equivalent drag areas along x, y, z [m^2].
+    """
+
+    mass: float
+    inertia: Array
+    flat_plate_areas: Array
+
+
+@dataclass(frozen=True)
+class Options:
+    """How the model reads the equations: see MODEL.md sections 5 and 9."""
+
+    coupling: str
+    hub_moment: str
+    flap_inertia: str
+    elements: int
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """One rotor, SI units and radians; the keys of the aircraft file without `_deg` and `_rpm`.
+
+    Attributes
+    ----------
+    hub, shaft_direction : ndarray, shape (3,)
+        Hub centre from the c.g. [m], direction of thrust; body axes.
+    rotation : int
+        +1 counter-clockwise seen from above (against the thrust), -1 clockwise.
+    mixing : ndarray, shape (3, 4)
+        Swashplate angles (collective, lateral, longitudinal cyclic) = mixing @ pilot controls.
+    """
+
+    name: str
+    hub: Array
+    shaft_direction: Array
+    rotation: int
+    speed: float
+    radius: float
+    blades: int
+    blade_mass: float
+    blade_cg: float
+    hinge_offset: float
+    flap_hinge_offset: float
+    flap_spring: float
+    lag_spring: float
+    lag_damping: float
+    pitch_flap_coupling: float
+    pitch_lag_coupling: float
+    chord_root: float
+    chord_tip: float
+    twist_root: float
+    twist_tip: float
+    root_cutout: float
+    tip_loss: float
+    swashplate_phase: float
+    airfoil: str
+    duct_expansion: float
+    collective_range: Range
+    cyclic_range: Range
+    swashplate_rate: float
+    mixing: Array
+
+    @property
+    def blade_length(self) -> float:
+        """L, from the flap hinge to the tip [m]."""
+        return self.radius - self.hinge_offset
+
+    @property
+    def first_moment(self) -> float:
+        """S1 of a blade about its flap hinge [kg m]."""
+        return self.blade_mass * self.blade_cg
+
+    @property
+    def second_moment(self) -> float:
+        """A1 of a blade about its flap hinge, m_b L^2 / 3 [kg m^2]."""
+        return self.blade_mass * self.blade_length**2 / 3
+
+    def elements(self, count: int) -> Array:
+        """Blade elements at their mid-points (MODEL.md section 4).
+
+        Parameters
+        ----------
+        count : int
+
+        Returns
+        -------
+        ndarray, shape (params.ELEMENT_ROWS, count)
+            Distance from the flap hinge [m], chord [m], c ds / 2 [m^2], share that carries lift, twist [rad].
+        """
+        length = self.blade_length
+        width = (length - self.root_cutout) / count
+        span = self.root_cutout + width * (np.arange(count) + 0.5)
+        along = span / length
+        chord = self.chord_root + along * (self.chord_tip - self.chord_root)
+        lift_end = self.tip_loss * self.radius - self.hinge_offset
+        lift = np.clip((lift_end - (span - width / 2)) / width, 0.0, 1.0)
+        twist = self.twist_root + along * (self.twist_tip - self.twist_root)
+        return np.stack([span, chord, chord * width / 2, lift, twist])
+
+
+@dataclass(frozen=True)
+class Aircraft:
+    """An aircraft as its file describes it, checked.
+
+    Attributes
+    ----------
+    name, description : str
+    environment : Environment
+    body : Body
+    options : Options
+    control_ranges : dict of str to (float, float)
+        Range of each pilot control [rad].
+    rotors : tuple of Rotor
+    airfoils : dict of str to AirfoilTable
+    """
+
+    name: str
+    description: str
+    environment: Environment
+    body: Body
+    options: Options
+    control_ranges: dict[str, Range]
+    rotors: tuple[Rotor, ...]
+    airfoils: dict[str, AirfoilTable] = field(repr=False)
+
+    @classmethod
+    def load(cls, path_or_name: str | Path) -> "Aircraft":
+        """Read an aircraft file.
+
+        Parameters
+        ----------
+        path_or_name : str or Path
+            A path, or the name of a file in config/aircraft ("sbs").
+
+        Raises
+        ------
+        AircraftError
+            One line that names the file and every wrong key with its value and what is allowed.
+        """
+        path = _find(path_or_name, "aircraft", ".yaml")
+        try:
+            return cls.from_dict(_read_yaml(path), path.parent)
+        except AircraftError as error:
+            raise AircraftError(f"{path}: {error}") from None
+
+    @classmethod
+    def from_dict(cls, data: Any, folder: Path | None = None) -> "Aircraft":
+        """Aircraft of a mapping with the keys of an aircraft file.
+
+        Parameters
+        ----------
+        data : dict
+            As read from YAML.
+        folder : Path, optional
+            Where relative paths of airfoils start; the current folder if not given.
+
+        Raises
+        ------
+        AircraftError
+            See `load`.
+        """
+        _check_schema(data)
+        rotors = tuple(_rotor(entry) for entry in data["rotors"])
+        body = data["body"]
+        aircraft = cls(
+            name=data["name"],
+            description=data.get("description", ""),
+            environment=Environment(**{key: float(value) for key, value in data["environment"].items()}),
+            body=Body(float(body["mass"]), _frozen(body["inertia"]), _frozen(body["flat_plate_areas"])),
+            options=Options(**data["options"]),
+            control_ranges={name: _radians(data["controls"][name]["range_deg"]) for name in CONTROL_NAMES},
+            rotors=rotors,
+            airfoils=_load_airfoils(rotors, folder or Path.cwd()),
+        )
+        problems = _physical_problems(aircraft)
+        if problems:
+            raise AircraftError("; ".join(problems))
+        return aircraft
+
+    @property
+    def layout(self) -> StateLayout:
+        """Places and names of the states of this aircraft."""
+        return StateLayout(tuple(rotor.blades for rotor in self.rotors))
+
+    def mix(self, controls: Array) -> Array:
+        """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls [rad], shape (4,)."""
+        return np.stack([rotor.mixing @ np.asarray(controls, dtype=float) for rotor in self.rotors])
+
+    def fuselage(self) -> tuple[float, Array, Array]:
+        """Mass [kg], first moment [kg m] and inertia [kg m^2] about the c.g. of the aircraft without blades.
+
+        The printed totals minus the blades, undeflected and averaged over azimuth (MODEL.md section 5); the c.g. of
+        the whole stays at the origin, so the fuselage has the first moment that balances the blades.
+        """
+        mass = self.body.mass
+        first = np.zeros(3)
+        inertia = self.body.inertia.copy()
+        for rotor in self.rotors:
+            blades = rotor.blades * rotor.blade_mass
+            mass -= blades
+            first -= blades * rotor.hub
+            inertia -= _blades_inertia(rotor)
+        return mass, first, inertia
+
+    def params(self, lead_lag: bool = True, cyclic_inflow: bool = True) -> P.Params:
+        """Arrays of the compiled model with the given fidelity (MODEL.md section 7).
+
+        Parameters
+        ----------
+        lead_lag : bool
+            False holds the blades at zero lag.
+        cyclic_inflow : bool
+            False holds lambdas and lambdac at zero.
+        """
+        complete = self.options.coupling == "complete"
+        mass, first, inertia = self.fuselage() if complete else (self.body.mass, np.zeros(3), self.body.inertia)
+        names = sorted(self.airfoils)
+        tables = [cells(self.airfoils[name]) for name in names]
+        first_rows = np.concatenate([[0], np.cumsum([len(table) for table in tables])])
+        index, grid = _airfoil_grids(self, dict(zip(names, first_rows, strict=False)))
+        air = self.environment
+        return P.Params(
+            air=np.array(
+                [air.air_density, 1 / air.kinematic_viscosity, air.gravity, *self.body.flat_plate_areas]
+            ),
+            body=np.array([mass, *first, *inertia.ravel(), self.body.mass]),
+            switches=np.array(
+                [lead_lag, cyclic_inflow, complete, self.options.hub_moment == "complete"], dtype=np.int64
+            ),
+            first_blade=np.cumsum([0, *(rotor.blades for rotor in self.rotors)]).astype(np.int64),
+            rotor=np.stack([self._rotor_row(rotor) for rotor in self.rotors]),
+            axes=np.stack([hub_axes(rotor.shaft_direction) for rotor in self.rotors]),
+            element=np.stack([rotor.elements(self.options.elements) for rotor in self.rotors]),
+            cells=np.concatenate(tables),
+            grid_index=index,
+            grid=grid,
+        )
+
+    def _rotor_row(self, rotor: Rotor) -> Array:
+        row = np.zeros(P.ROTOR_SIZE)
+        row[P.SPEED], row[P.RADIUS], row[P.SENSE] = rotor.speed, rotor.radius, rotor.rotation
+        row[P.HINGE], row[P.FLAP_HINGE] = rotor.hinge_offset, rotor.flap_hinge_offset
+        row[P.LAG_HINGE] = rotor.hinge_offset - rotor.flap_hinge_offset
+        row[P.BLADE_MASS], row[P.S1], row[P.A1_HUB] = rotor.blade_mass, rotor.first_moment, rotor.second_moment
+        whole = self.options.flap_inertia == "axis_to_tip"
+        row[P.A1] = rotor.blade_mass * rotor.radius**2 / 3 if whole else rotor.second_moment
+        row[P.FLAP_SPRING], row[P.LAG_SPRING] = rotor.flap_spring, rotor.lag_spring
+        row[P.LAG_DAMPING] = rotor.lag_damping
+        row[P.PITCH_FLAP], row[P.PITCH_LAG] = rotor.pitch_flap_coupling, rotor.pitch_lag_coupling
+        row[P.COS_PHASE], row[P.SIN_PHASE] = math.cos(rotor.swashplate_phase), math.sin(rotor.swashplate_phase)
+        row[P.DUCT] = rotor.duct_expansion
+        row[P.HUB_X : P.HUB_Z + 1] = rotor.hub
+        return row
+
+
+def config_folder() -> Path:
+    """Folder with the aircraft and airfoil files that come with the package.
+
+    Raises
+    ------
+    AircraftError
+        The package was installed without them.
+    """
+    here = Path(__file__).resolve().parent
+    places = [here.parent / "config", *(parent / "share/sbs_sim/config" for parent in here.parents)]
+    for place in places:
+        if (place / "aircraft").is_dir():
+            return place
+    raise AircraftError(f"no folder config/aircraft beside {here.parent} and none under share/sbs_sim above it")
+
+
+def _find(path_or_name: str | Path, kind: str, suffix: str, folder: Path | None = None) -> Path:
+    """Path of a configuration file given by path or by name."""
+    given = Path(path_or_name)
+    folders = [Path(), *([folder] if folder else []), config_folder() / kind]
+    for place in folders:
+        for candidate in (place / given, place / f"{given}{suffix}"):
+            if candidate.is_file():
+                return candidate
+    known = ", ".join(sorted(path.stem for path in (config_folder() / kind).glob(f"*{suffix}")))
+    raise AircraftError(f"{kind.rstrip('s')} = {str(path_or_name)!r}: allowed are a file's path or one of {known}")
+
+
+def _read_yaml(path: Path) -> Any:
+    from ruamel.yaml import YAML, YAMLError  # here, because it is slow to import and needed once
+
+    try:
+        return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    except (YAMLError, UnicodeDecodeError, OSError) as error:
+        raise AircraftError("not readable as YAML: " + " ".join(str(error).split())) from None
+
+
+def _check_schema(data: Any) -> None:
+    """Raise AircraftError with all that is wrong with keys, types and plain ranges."""
+    from jsonschema import Draft202012Validator  # here, because it is slow to import and needed once
+
+    schema = json.loads((config_folder() / "aircraft.schema.json").read_text(encoding="utf-8"))
+    errors = sorted(Draft202012Validator(schema).iter_errors(data), key=lambda error: list(map(str, error.path)))
+    problems = [_explain(error) for error in errors] + [
+        f"{path} = {value}: allowed is a finite number" for path, value in _not_finite(data, "")
+    ]
+    if problems:
+        raise AircraftError("; ".join(problems))
+
+
+def _not_finite(data: Any, path: str) -> list[tuple[str, float]]:
+    if isinstance(data, dict):
+        return [item for key, value in data.items() for item in _not_finite(value, f"{path}.{key}".lstrip("."))]
+    if isinstance(data, list):
+        return [item for i, value in enumerate(data) for item in _not_finite(value, f"{path}[{i}]")]
+    return [(path, data)] if isinstance(data, float) and not math.isfinite(data) else []
+
+
+def _explain(error: Any) -> str:
+    """One schema error as "path = value: what is allowed"."""
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error.absolute_path)
+    path = path.lstrip(".")
+    rule, limit, value = error.validator, error.validator_value, error.instance
+    if rule == "additionalProperties":
+        known = error.schema["properties"]
+        unknown = [str(key) for key in value if key not in known]
+        where = ", ".join(f"{path}.{key}".lstrip(".") for key in unknown)
+        return f"{where}: unknown key, allowed are {', '.join(known)}"
+    if rule == "required":
+        missing = [key for key in limit if key not in value]
+        return f"{', '.join(f'{path}.{key}'.lstrip('.') for key in missing)}: missing key"
+    allowed = {
+        "type": f"of type {limit}",
+        "enum": "one of " + ", ".join(map(str, limit)) if rule == "enum" else "",
+        "minimum": f">= {limit}",
+        "maximum": f"<= {limit}",
+        "exclusiveMinimum": f"> {limit}",
+        "minItems": f"a list of at least {limit}",
+        "maxItems": f"a list of at most {limit}",
+        "minLength": "a text that is not empty",
+    }.get(rule, error.message)
+    return f"{path or 'file'} = {_short(value)}: allowed is {allowed}"
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _rotor(entry: dict[str, Any]) -> Rotor:
+    """Rotor of one entry of the file."""
+    values = dict(entry)
+    twist, chord, mixing = values.pop("twist_deg"), values.pop("chord"), values.pop("mixing")
+    rows = [[mixing[angle].get(control, 0.0) for control in CONTROL_NAMES] for angle in SWASHPLATE_NAMES]
+    numbers = {key: float(value) for key, value in values.items() if isinstance(value, (int, float))}
+    numbers["speed"] = numbers.pop("speed_rpm") * math.pi / 30
+    numbers["swashplate_phase"] = math.radians(numbers.pop("swashplate_phase_deg"))
+    numbers["swashplate_rate"] = math.radians(numbers.pop("swashplate_rate_deg"))
+    return Rotor(
+        **{
+            **numbers,
+            "name": values["name"],
+            "airfoil": values["airfoil"],
+            "rotation": int(values["rotation"]),
+            "blades": int(values["blades"]),
+            "hub": _frozen(values["hub"]),
+            "shaft_direction": _frozen(values["shaft_direction"]),
+            "collective_range": _radians(values["collective_range_deg"]),
+            "cyclic_range": _radians(values["cyclic_range_deg"]),
+            "chord_root": float(chord["root"]),
+            "chord_tip": float(chord["tip"]),
+            "twist_root": math.radians(twist["root"]),
+            "twist_tip": math.radians(twist["tip"]),
+            "mixing": _frozen(rows),
+        }  # type: ignore[arg-type]
+    )
+
+
+def _frozen(values: Any) -> Array:
+    array = np.array(values, dtype=float)
+    array.flags.writeable = False
+    return array
+
+
+def _radians(degrees: list[float]) -> Range:
+    return math.radians(degrees[0]), math.radians(degrees[1])
+
+
+def _load_airfoils(rotors: tuple[Rotor, ...], folder: Path) -> dict[str, AirfoilTable]:
+    """Airfoil table of every name that a rotor uses; a partial table is extended for its blade's aspect ratio."""
+    tables: dict[str, AirfoilTable] = {}
+    for i, rotor in enumerate(rotors):
+        if rotor.airfoil not in tables:
+            try:
+                path = _find(rotor.airfoil, "airfoils", ".csv", folder)
+            except AircraftError as error:
+                raise AircraftError(f"rotors[{i}].{error}") from None
+            aspect_ratio = 2 * rotor.radius / (rotor.chord_root + rotor.chord_tip)
+            tables[rotor.airfoil] = read_table(path, aspect_ratio)
+    return tables
+
+
+def _airfoil_grids(aircraft: Aircraft, first_rows: dict[str, int]) -> tuple[P.IntArray, Array]:
+    """`grid_index` and `grid` of Params, with the first row of each airfoil in `cells`."""
+    most = max(len(table.reynolds) for table in aircraft.airfoils.values())
+    index = np.zeros((len(aircraft.rotors), 3), dtype=np.int64)
+    grid = np.zeros((len(aircraft.rotors), 2 + most))
+    for j, rotor in enumerate(aircraft.rotors):
+        table = aircraft.airfoils[rotor.airfoil]
+        knots = len(table.reynolds)
+        n_alpha, alpha0, inverse_step = cell_grid(table)
+        index[j] = first_rows[rotor.airfoil], n_alpha, knots
+        grid[j, :2] = alpha0, inverse_step
+        grid[j, 2 : 2 + knots] = table.reynolds
+    return index, grid
+
+
+def _blades_inertia(rotor: Rotor) -> Array:
+    """Inertia about the c.g. of a rotor's undeflected blades, averaged over azimuth [kg m^2], shape (3, 3)."""
+    e0 = rotor.hinge_offset
+    polar = rotor.blades * (rotor.blade_mass * e0**2 + 2 * e0 * rotor.first_moment + rotor.second_moment)
+    axes = hub_axes(rotor.shaft_direction)
+    about_hub = axes @ np.diag([polar / 2, polar / 2, polar]) @ axes.T
+    hub, mass = rotor.hub, rotor.blades * rotor.blade_mass
+    return about_hub + mass * (hub @ hub * np.eye(3) - np.outer(hub, hub))
+
+
+def _physical_problems(aircraft: Aircraft) -> list[str]:
+    """What no schema can say: relations between values that physics demands."""
+    problems = _inertia_problems("body.inertia", aircraft.body.inertia)
+    options = aircraft.options
+    if options.coupling == "complete":
+        for key, value in (("hub_moment", options.hub_moment), ("flap_inertia", options.flap_inertia)):
+            if value in ("paper", "axis_to_tip"):
+                problems.append(f"options.{key} = {value!r}: allowed with options.coupling = paper only")
+    for name, limits in aircraft.control_ranges.items():
+        problems += _range_problems(f"controls.{name}.range_deg", limits)
+    for i, rotor in enumerate(aircraft.rotors):
+        problems += [f"rotors[{i}].{problem}" for problem in _rotor_problems(rotor)]
+    names = [rotor.name for rotor in aircraft.rotors]
+    problems += [f"rotors[{i}].name = {name!r}: used twice" for i, name in enumerate(names) if name in names[:i]]
+    if problems:
+        return problems
+    mass, _, inertia = aircraft.fuselage()
+    if mass <= 0:
+        blades = aircraft.body.mass - mass
+        return [f"body.mass = {aircraft.body.mass}: allowed is > {blades:g}, the mass of all blades"]
+    return _inertia_problems("body.inertia without the blades", inertia)
+
+
+def _inertia_problems(path: str, inertia: Array) -> list[str]:
+    shown = inertia.round(6).tolist()
+    if not np.allclose(inertia, inertia.T, rtol=0, atol=1e-12 * abs(inertia).max()):
+        return [f"{path} = {shown}: allowed is a symmetric matrix"]
+    moments = np.linalg.eigvalsh(inertia)
+    if moments[0] <= 0:
+        return [f"{path} = {shown}: allowed is a positive definite matrix"]
+    if moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+        return [f"{path} = {shown}: allowed are principal moments of which none exceeds the sum of the others"]
+    return []
+
+
+def _range_problems(path: str, limits: Range) -> list[str]:
+    low, high = (round(math.degrees(value), 9) for value in limits)
+    return [] if low <= high else [f"{path} = [{low:g}, {high:g}]: allowed is a lower end below the upper one"]
+
+
+def _rotor_problems(rotor: Rotor) -> list[str]:
+    length = rotor.blade_length
+    checks = [
+        (np.linalg.norm(rotor.shaft_direction) > 1e-6, "shaft_direction", "a vector that is not zero"),
+        (rotor.hinge_offset < rotor.radius, "hinge_offset", f"< {rotor.radius:g}, the radius"),
+        (
+            rotor.flap_hinge_offset <= rotor.hinge_offset,
+            "flap_hinge_offset",
+            f"<= {rotor.hinge_offset:g}, the hinge_offset",
+        ),
+        (rotor.root_cutout < length, "root_cutout", f"< {length:g}, from the flap hinge to the tip"),
+        (
+            rotor.blade_cg <= length / math.sqrt(3),
+            "blade_cg",
+            f"<= {length / math.sqrt(3):.6g}, L/sqrt(3): the blade's second moment is m_b L^2/3",
+        ),
+    ]
+    problems = [f"{key} = {_plain(getattr(rotor, key))}: allowed is {text}" for good, key, text in checks if not good]
+    problems += _range_problems("collective_range_deg", rotor.collective_range)
+    return problems + _range_problems("cyclic_range_deg", rotor.cyclic_range)
+
+
+def _plain(value: Any) -> str:
+    return str(value.tolist() if isinstance(value, np.ndarray) else value)

@@ -1,0 +1,1 @@
+"""Trim of the model: the Python API and the bodies of the services."""

@@ -1,0 +1,439 @@
+"""Section lift and drag over Reynolds number and angle of attack (MODEL.md section 4).
+
+A table holds cl and cd on a full grid of Reynolds numbers and angles from -180 to 180 deg. Compiled code
+reads it as an array of cells, one 64-byte row per cell with the coefficients of the bilinear interpolation,
+laid out over three turns of the angle so that nothing has to be wrapped.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sbs_sim.errors import AirfoilError
+from sbs_sim.model.kernel import kernel
+
+Array = NDArray[np.float64]
+
+COLUMNS = ("reynolds", "alpha_deg", "cl", "cd")
+HEADER = ",".join(COLUMNS)
+REFLECTED_LIFT = -0.7  # cl of the reversed airfoil over cl of the airfoil at the mirrored angle
+TURNS = 3  # turns of the angle that the cells cover: -540..540 deg
+MIN_STEP_DEG, MAX_STEP_DEG = 0.01, 10.0
+STEP_TOLERANCE = 0.01  # of a step, for angles that were rounded in the file
+
+
+@dataclass(frozen=True, eq=False)
+class AirfoilTable:
+    """Lift and drag coefficients of one airfoil over the full circle.
+
+    Attributes
+    ----------
+    name : str
+    reynolds : ndarray, shape (n_re,)
+        Reynolds numbers, increasing, at least two.
+    alpha : ndarray, shape (n_alpha,)
+        Angles of attack [rad] from -pi to pi with one step.
+    cl, cd : ndarray, shape (n_re, n_alpha)
+        Lift and drag coefficient; the values at -pi and pi are equal.
+    """
+
+    name: str
+    reynolds: Array
+    alpha: Array
+    cl: Array
+    cd: Array
+
+
+def viterna(
+    alpha: ArrayLike, alpha_stall: float, cl_stall: float, cd_stall: float, aspect_ratio: float
+) -> tuple[Array, Array]:
+    """Lift and drag of a stalled airfoil.
+
+    Up to 90 deg the formulas of Viterna and Corrigan, which pass through the given stall point. Past 90 deg
+    the airfoil is reversed: the curves are reflected, lift with the factor -0.7. Within alpha_stall of 180
+    deg the reversed airfoil is not stalled: lift is linear through zero at 180 deg, and drag keeps its
+    stall value, for the formula would fall below zero there. cl is odd and cd even in alpha; both are
+    continuous, and cd is positive.
+
+    Parameters
+    ----------
+    alpha : array_like
+        Angles of attack [rad] in -pi..pi, beyond stall; nearer to zero the stall values are returned.
+    alpha_stall : float
+        Angle [rad] of the stall point, between 0 and pi/2.
+    cl_stall, cd_stall : float
+        Coefficients at the stall point.
+    aspect_ratio : float
+        Blade length over chord, which sets the drag of the blade broadside on.
+
+    Returns
+    -------
+    cl, cd : ndarray, same shape as alpha
+
+    References ---------- MODEL.md section 4. L. A. Viterna, R. D. Corrigan: Fixed pitch rotor performance
+    of large horizontal axis wind turbines, NASA CP-2230, 1982. Reflection as in AirfoilPrep (National
+    Renewable Energy Laboratory).
+    """
+    magnitude = np.abs(np.asarray(alpha, dtype=np.float64))
+    is_reversed = magnitude > np.pi / 2
+    folded = np.where(is_reversed, np.pi - magnitude, magnitude)
+    stalled = np.maximum(folded, alpha_stall)
+    sine, cosine = np.sin(stalled), np.cos(stalled)
+    sine_s, cosine_s = math.sin(alpha_stall), math.cos(alpha_stall)
+    cd_max = 1.11 + 0.018 * aspect_ratio
+    a2 = (cl_stall - cd_max * sine_s * cosine_s) * sine_s / cosine_s**2
+    b2 = (cd_stall - cd_max * sine_s**2) / cosine_s
+    cl = cd_max * sine * cosine + a2 * cosine**2 / sine
+    cd = cd_max * sine**2 + b2 * cosine
+    cl = np.where(is_reversed, REFLECTED_LIFT * cl * folded / stalled, cl)
+    return np.sign(alpha) * cl, cd
+
+
+def extend_polar(
+    alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: float
+) -> tuple[Array, Array, Array]:
+    """Extend a polar to the full circle by `viterna` from its last point on either side.
+
+    Parameters
+    ----------
+    alpha : array_like, shape (n,)
+        Angles of attack [rad], multiples of one step that divides pi, from -pi/2..0 to 0..pi/2 (ends
+        excluded).
+    cl, cd : array_like, shape (n,)
+        Lift and drag coefficient.
+    aspect_ratio : float
+        Blade length over chord.
+
+    Returns
+    -------
+    alpha, cl, cd : ndarray, shape (2 pi / step + 1,)
+        From -pi to pi with the same step; cl and cd are equal at both ends.
+    """
+    alpha, cl, cd = (np.asarray(values, dtype=np.float64) for values in (alpha, cl, cd))
+    step = (alpha[-1] - alpha[0]) / (len(alpha) - 1)
+    half = round(np.pi / step)
+    circle = np.arange(-half, half + 1) * (np.pi / half)
+    first = half + round(alpha[0] / step)
+    last = first + len(alpha) - 1
+    low, high = -circle[first], circle[last]
+    below = viterna(circle[:first], low, -cl[0], cd[0], aspect_ratio)
+    above = viterna(circle[last + 1 :], high, cl[-1], cd[-1], aspect_ratio)
+    circle_cl = np.concatenate([below[0], cl, above[0]])
+    circle_cd = np.concatenate([below[1], cd, above[1]])
+    # The two sides of a cambered airfoil would meet at 180 deg with unequal drag: pass from one to the other.
+    past_180 = np.where(circle > 0, circle - np.pi, circle + np.pi)
+    unstalled = (np.abs(circle) > np.pi / 2) & (past_180 > -high) & (past_180 < low)
+    circle_cd[unstalled] = np.interp(past_180[unstalled], [-high, low], [cd[-1], cd[0]])
+    return circle, circle_cl, circle_cd
+
+
+def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
+    """Read an airfoil table from a CSV file.
+
+    The file has the header `reynolds,alpha_deg,cl,cd` and a full grid: one block of rows for each Reynolds
+    number, in increasing order, each with the same angles in one step. Lines that begin with '#' are
+    comments. The angles run from -180 to 180 deg, or over an attached range around zero that `extend_polar`
+    completes.
+
+    Parameters
+    ----------
+    path : str or Path
+    aspect_ratio : float
+        Blade length over chord, used where the table has to be extended.
+
+    Returns
+    -------
+    AirfoilTable
+        Named after the file.
+
+    Raises
+    ------
+    AirfoilError
+        With one line: file, line, column, the value and what is allowed.
+    """
+    path = Path(path)
+    values, lines = _read_rows(path)
+    blocks = _split_blocks(path, values, lines)
+    half = _check_angles(path, values, lines, blocks)
+    reynolds = values[[block.start for block in blocks], 0]
+    step = np.pi / half
+    alpha = np.rint(values[blocks[0], 1] / math.degrees(step)) * step
+    cl = np.array([values[block, 2] for block in blocks])
+    cd = np.array([values[block, 3] for block in blocks])
+    if len(alpha) == 2 * half + 1:
+        _check_ends(path, lines, blocks, cl, cd)
+        return AirfoilTable(path.stem, reynolds, alpha, cl, cd)
+    extended = [extend_polar(alpha, *polar, aspect_ratio) for polar in zip(cl, cd, strict=True)]
+    circle, circle_cl, circle_cd = (np.array(rows) for rows in zip(*extended, strict=True))
+    return AirfoilTable(path.stem, reynolds, circle[0], circle_cl, circle_cd)
+
+
+def _read_rows(path: Path) -> tuple[Array, list[int]]:
+    """All rows as numbers, shape (n, 4), and the line number of each."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise AirfoilError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise AirfoilError(f"{path}: byte {error.start} is not UTF-8 text") from error
+    content = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1)]
+    content = [(i, line) for i, line in content if line and not line.startswith("#")]
+    if not content:
+        raise AirfoilError(f"{path}: holds no table, must begin with the header {HEADER}")
+    number, header = content[0]
+    if header.replace(" ", "") != HEADER:
+        raise AirfoilError(f"{path}:{number}: header {header[:60]!r} must be {HEADER}")
+    rows = [_parse_row(path, i, line) for i, line in content[1:]]
+    if not rows:
+        raise AirfoilError(f"{path}:{number}: no rows follow the header")
+    return np.array(rows), [i for i, _ in content[1:]]
+
+
+def _parse_row(path: Path, line: int, text: str) -> list[float]:
+    fields = text.split(",")
+    if len(fields) != len(COLUMNS):
+        raise AirfoilError(f"{path}:{line}: {len(fields)} values, must be {len(COLUMNS)}: {HEADER}")
+    row = [_parse_number(path, line, *item) for item in zip(COLUMNS, fields, strict=True)]
+    for column in ("reynolds", "cd"):
+        value = row[COLUMNS.index(column)]
+        if value <= 0:
+            raise _bad(path, line, column, value, "greater than 0")
+    return row
+
+
+def _parse_number(path: Path, line: int, column: str, field: str) -> float:
+    try:
+        value = float(field)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise AirfoilError(f"{path}:{line}: {column} {field.strip()[:40]!r} must be a finite number")
+    return value
+
+
+def _bad(path: Path, line: int, column: str, value: float, allowed: str) -> AirfoilError:
+    return AirfoilError(f"{path}:{line}: {column} {value:.10g} must be {allowed}")
+
+
+def _split_blocks(path: Path, values: Array, lines: list[int]) -> list[slice]:
+    """Rows of each Reynolds number; every block must repeat the angles of the first."""
+    reynolds = values[:, 0]
+    for i in np.flatnonzero(np.diff(reynolds) < 0) + 1:
+        raise _bad(path, lines[i], "reynolds", reynolds[i], f"at least {reynolds[i - 1]:.10g}, the one above")
+    starts = [0, *(np.flatnonzero(np.diff(reynolds)) + 1)]
+    blocks = [slice(*ends) for ends in zip(starts, [*starts[1:], len(values)], strict=True)]
+    if len(blocks) < 2:
+        raise _bad(path, lines[0], "reynolds", reynolds[0], "one of at least 2 different values in the table")
+    first = values[blocks[0], 1]
+    for block in blocks:
+        angles = values[block, 1]
+        for i in range(min(len(angles), len(first))):
+            if angles[i] != first[i]:
+                allowed = f"{first[i]:.10g} as for the first Reynolds number"
+                raise _bad(path, lines[block.start + i], "alpha_deg", angles[i], allowed)
+        if len(angles) != len(first):
+            allowed = (
+                f"the last of {len(first)} angles as for the first Reynolds number, not of {len(angles)}"
+            )
+            raise _bad(path, lines[block.stop - 1], "alpha_deg", angles[-1], allowed)
+    return blocks
+
+
+def _check_angles(path: Path, values: Array, lines: list[int], blocks: list[slice]) -> int:
+    """Check the angles of the first block and return the number of steps in 180 deg."""
+    angles = values[blocks[0], 1]
+    if len(angles) < 3:
+        raise _bad(path, lines[0], "alpha_deg", angles[0], "one of at least 3 angles per Reynolds number")
+    _check_step(path, angles, lines)
+    _check_span(path, angles, lines)
+    step = (angles[-1] - angles[0]) / (len(angles) - 1)
+    half = round(float(180 / step))
+    place = angles / 180 * half
+    for i in np.flatnonzero(np.abs(place - np.rint(place)) > STEP_TOLERANCE):
+        raise _bad(
+            path,
+            lines[i],
+            "alpha_deg",
+            angles[i],
+            f"a multiple of a step that divides 180, not of {step:.10g}",
+        )
+    return half
+
+
+def _check_step(path: Path, angles: Array, lines: list[int]) -> None:
+    step = angles[1] - angles[0]
+    if not MIN_STEP_DEG <= step <= MAX_STEP_DEG:
+        allowed = f"{MIN_STEP_DEG:g} to {MAX_STEP_DEG:g} above {angles[0]:.10g}"
+        raise _bad(path, lines[1], "alpha_deg", angles[1], allowed)
+    for i in np.flatnonzero(np.abs(np.diff(angles) - step) > STEP_TOLERANCE * step) + 1:
+        allowed = f"{angles[i - 1] + step:.10g}, one step of {step:.10g} after the angle above"
+        raise _bad(path, lines[i], "alpha_deg", angles[i], allowed)
+
+
+def _check_span(path: Path, angles: Array, lines: list[int]) -> None:
+    first, last = angles[0], angles[-1]
+    if not (first == -180 or -90 < first < 0):
+        raise _bad(path, lines[0], "alpha_deg", first, "-180, or between -90 and 0")
+    if first == -180 and last != 180:
+        raise _bad(path, lines[len(angles) - 1], "alpha_deg", last, "180 where the first angle is -180")
+    if first > -180 and not 0 < last < 90:
+        allowed = "between 0 and 90 where the first angle is above -180"
+        raise _bad(path, lines[len(angles) - 1], "alpha_deg", last, allowed)
+
+
+def _check_ends(path: Path, lines: list[int], blocks: list[slice], cl: Array, cd: Array) -> None:
+    """Angles of -180 and 180 deg are one angle and must have one value."""
+    for column, values in (("cl", cl), ("cd", cd)):
+        for block, polar in zip(blocks, values, strict=True):
+            if abs(polar[-1] - polar[0]) > 1e-9:
+                allowed = f"{polar[0]:.10g} as at -180 deg"
+                raise _bad(path, lines[block.stop - 1], column, polar[-1], allowed)
+
+
+def write_table(path: str | Path, table: AirfoilTable, comments: Sequence[str] = ()) -> None:
+    """Write a table in the format of `read_table`, coefficients rounded to six decimals.
+
+    Parameters
+    ----------
+    path : str or Path
+    table : AirfoilTable
+    comments : sequence of str
+        Lines on the table's origin, written on top behind '# '.
+    """
+    half = round(np.pi / (table.alpha[1] - table.alpha[0]))
+    angles = np.rint(table.alpha / np.pi * half) * 180 / half
+    lines = [f"# {comment}".rstrip() for comment in comments] + [HEADER]
+    for i, reynolds in enumerate(table.reynolds):
+        for j, angle in enumerate(angles):
+            # Adding zero turns a rounded -0 into 0.
+            cl, cd = round(table.cl[i, j], 6) + 0.0, round(table.cd[i, j], 6)
+            lines.append(f"{reynolds:.10g},{angle:.10g},{cl:.6f},{cd:.6f}")
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def cells(table: AirfoilTable) -> Array:
+    """Coefficients of the bilinear interpolation in every cell of a table, for `lookup`.
+
+    Within a cell, with x and y in 0..1 the fractions along angle and Reynolds number,
+    cl = c0 + c1 x + c2 y + c3 x y and cd = c4 + c5 x + c6 y + c7 x y.
+
+    Parameters
+    ----------
+    table : AirfoilTable
+
+    Returns
+    -------
+    ndarray, shape ((n_re - 1) * cell_grid(table)[0], 8)
+        The angle runs fastest and covers -540..540 deg, so that a section angle minus an atan2, -3 pi..3
+        pi, needs no wrapping.
+    """
+    coefficients = np.concatenate([_bilinear(table.cl), _bilinear(table.cd)], axis=-1)
+    return np.ascontiguousarray(np.tile(coefficients, (1, TURNS, 1)).reshape(-1, 8))
+
+
+def _bilinear(f: Array) -> Array:
+    """Coefficients of 1, x, y, xy per cell, shape (n_re - 1, n_alpha - 1, 4), of values (n_re, n_alpha)."""
+    corner = f[:-1, :-1]
+    along_alpha = f[:-1, 1:] - corner
+    along_re = f[1:, :-1] - corner
+    twist = f[1:, 1:] - f[1:, :-1] - along_alpha
+    return np.stack([corner, along_alpha, along_re, twist], axis=-1)
+
+
+def cell_grid(table: AirfoilTable) -> tuple[int, float, float]:
+    """Angle grid of `cells`.
+
+    Returns
+    -------
+    n_alpha : int
+        Cells along the angle for each Reynolds cell.
+    alpha0 : float
+        First angle [rad].
+    inverse_step : float
+        Cells per radian.
+    """
+    per_turn = len(table.alpha) - 1
+    return TURNS * per_turn, -TURNS * np.pi, per_turn / (2 * np.pi)
+
+
+@kernel
+def lookup(cells, first_row, n_alpha, alpha0, inverse_step, knots, n_re, reynolds, alpha):
+    """Lift and drag coefficient at one Reynolds number and angle, bilinear.
+
+    Outside the table the nearest value is taken, so that no finite or infinite input reads outside `cells`.
+    NaN reads inside as well and gives NaN.
+
+    Parameters
+    ----------
+    cells : ndarray, shape (n, 8)
+        `cells` of one or more tables, one after the other.
+    first_row : int
+        First row of the table.
+    n_alpha, alpha0, inverse_step : int, float, float
+        `cell_grid` of the table; angles in rad.
+    knots : ndarray, shape (at least n_re,)
+        Reynolds numbers of the table.
+    n_re : int
+        Number of Reynolds numbers.
+    reynolds, alpha : float
+        Reynolds number and angle of attack [rad].
+
+    Returns
+    -------
+    cl, cd : float
+    """
+    i = 0
+    while i < n_re - 2 and reynolds >= knots[i + 1]:
+        i += 1
+    y = _clamp((reynolds - knots[i]) / (knots[i + 1] - knots[i]), 1.0)
+    place = (alpha - alpha0) * inverse_step
+    # A comparison with NaN is false: the cell is then the last one, and the fractions stay NaN.
+    j = int(place if place > 0.0 else 0.0) if place < n_alpha else n_alpha - 1
+    x = _clamp(place - j, 1.0)
+    row = first_row + i * n_alpha + j
+    cl = cells[row, 0] + cells[row, 1] * x + (cells[row, 2] + cells[row, 3] * x) * y
+    cd = cells[row, 4] + cells[row, 5] * x + (cells[row, 6] + cells[row, 7] * x) * y
+    return cl, cd
+
+
+@kernel
+def _clamp(value, upper):
+    """Limit a number to 0..upper; NaN stays NaN."""
+    value = 0.0 if value < 0.0 else value
+    return upper if value > upper else value
+
+
+def interpolate(table: AirfoilTable, reynolds: ArrayLike, alpha: ArrayLike) -> tuple[Array, Array]:
+    """Lift and drag coefficients at arrays of Reynolds numbers and angles, for plots and checks.
+
+    Parameters
+    ----------
+    table : AirfoilTable
+    reynolds : array_like
+        Clamped to the table's range.
+    alpha : array_like
+        Angles of attack [rad] of any turn; broadcast against `reynolds`.
+
+    Returns
+    -------
+    cl, cd : ndarray
+        The broadcast shape.
+    """
+    knots, step = table.reynolds, table.alpha[1] - table.alpha[0]
+    clamped = np.clip(reynolds, knots[0], knots[-1])
+    i = np.clip(np.searchsorted(knots, clamped, side="right") - 1, 0, len(knots) - 2)
+    y = (clamped - knots[i]) / (knots[i + 1] - knots[i])
+    place = np.mod(np.asarray(alpha, dtype=np.float64) + np.pi, 2 * np.pi) / step
+    j = np.clip(place.astype(np.int64), 0, len(table.alpha) - 2)
+    x = place - j
+
+    def blend(f: Array) -> Array:
+        low = f[i, j] * (1 - x) + f[i, j + 1] * x
+        high = f[i + 1, j] * (1 - x) + f[i + 1, j + 1] * x
+        return low * (1 - y) + high * y
+
+    return blend(table.cl), blend(table.cd)

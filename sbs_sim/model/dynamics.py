@@ -1,0 +1,426 @@
+"""The derivative of the complete state (MODEL.md sections 2 to 7).
+
+Body and blades are one multibody system (`complete` coupling). Its mass matrix has the shape of an arrow: every
+blade's two hinge equations hold that blade's beta'', xi'' and the six accelerations of the body, nothing else. The
+blades are eliminated exactly, a 6x6 system for the body remains, and the blades follow. In the `paper` coupling
+the blades do not feel the hub's acceleration, and the same sums give the loads directly.
+
+The unknowns of the body are the specific force of the c.g. (acceleration minus gravity, so that gravity appears in
+one place only and free fall is exact) and the angular acceleration.
+"""
+
+import math
+
+from sbs_sim.model import params as P
+from sbs_sim.model import state as S
+from sbs_sim.model.blade import add_inertia, blade_terms
+from sbs_sim.model.duct import duct_thrust
+from sbs_sim.model.frames import cross, quaternion_rates, rotation_rows
+from sbs_sim.model.fuselage import plate_drag
+from sbs_sim.model.inflow import inflow_rates
+from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.multiblade import add_blade_acceleration, add_rotation_terms, blade_angle
+
+
+@entry
+def derivative(p, x, swash, psi, wind, work, dx):
+    """Time derivative of the simulation state; the loads of the rotors are left in `work.loads`.
+
+    Parameters
+    ----------
+    p : Params
+    x : ndarray, shape (size,)
+        Simulation state, see `sbs_sim.model.state`.
+    swash : ndarray, shape (n_rotors, 3)
+        Collective, lateral and longitudinal cyclic pitch of each rotor [rad].
+    psi : ndarray, shape (n_rotors,)
+        Azimuth of the first blade of each rotor, 0 aft, growing with the rotation [rad].
+    wind : ndarray, shape (3,)
+        Velocity of the air over ground, NED [m/s].
+    work : Work
+        `work.vector` holds the specific force of the c.g. [m/s^2] and om' [rad/s^2] afterwards.
+    dx : ndarray, shape (size,)
+        Output.
+    """
+    rot = rotation_rows(x[3], x[4], x[5], x[6])
+    om = (x[10], x[11], x[12])
+    gravity = p.air[P.GRAVITY]
+    g = (gravity * rot[6], gravity * rot[7], gravity * rot[8])
+    air = (
+        x[7] - (rot[0] * wind[0] + rot[3] * wind[1] + rot[6] * wind[2]),
+        x[8] - (rot[1] * wind[0] + rot[4] * wind[1] + rot[7] * wind[2]),
+        x[9] - (rot[2] * wind[0] + rot[5] * wind[1] + rot[8] * wind[2]),
+    )
+    for j in range(p.rotor.shape[0]):
+        _rotor_terms(p, j, x, swash, psi[j], air, om, g, work)
+    _start_body_system(p, air, om, work)
+    if p.switches[P.COMPLETE_COUPLING] == 1:
+        _solve_with_blades(p, work)
+        _solve_blades(p, work)
+        _hub_loads(p, om, work)
+    else:
+        _solve_blades_alone(p, work)
+        _hub_loads(p, om, work)
+        _solve_body_alone(p, work)
+    _body_rates(x, rot, om, g, work.vector, dx)
+    _rotor_rates(p, x, work, dx)
+
+
+@kernel
+def _rotor_terms(p, j, x, swash, psi, air, om, g, work):
+    """Work rows of the blades of rotor j, and the sums over them that the inflow and the inertia need."""
+    rotor = p.rotor[j]
+    a = p.axes[j]
+    hub = (rotor[P.HUB_X], rotor[P.HUB_Y], rotor[P.HUB_Z])
+    spin = cross(om[0], om[1], om[2], hub[0], hub[1], hub[2])
+    flow = _to_hub(a, air[0] + spin[0], air[1] + spin[1], air[2] + spin[2])
+    rates = _to_hub(a, om[0], om[1], om[2])
+    if p.switches[P.COMPLETE_COUPLING] == 1:
+        centripetal = cross(om[0], om[1], om[2], spin[0], spin[1], spin[2])
+        base = _to_hub(a, centripetal[0], centripetal[1], centripetal[2])
+        hang = (0.0, 0.0, 0.0)
+    else:
+        base = _to_hub(a, -g[0], -g[1], -g[2])
+        hang = base
+    work.hub_flow[j, 0], work.hub_flow[j, 1], work.hub_flow[j, 2] = flow
+
+    all_blades = p.first_blade[-1]
+    first = p.first_blade[j]
+    n_blades = p.first_blade[j + 1] - first
+    flap, flap_rate = S.BODY_SIZE + first, S.BODY_SIZE + all_blades + first
+    lag, lag_rate = S.BODY_SIZE + 2 * all_blades + first, S.BODY_SIZE + 3 * all_blades + first
+    inflow = S.BODY_SIZE + 4 * all_blades + 3 * j
+    lambda0, lambdas, lambdac = x[inflow], x[inflow + 1], x[inflow + 2]
+    lead_lag, cyclic = p.switches[P.LEAD_LAG], p.switches[P.CYCLIC_INFLOW]
+    omega = rotor[P.SPEED]
+    work.rotor_inertia[j, :] = 0.0
+    thrust = sine_moment = cosine_moment = 0.0
+    cosine, sine = math.cos(psi), math.sin(psi)
+    step_c, step_s = math.cos(2.0 * math.pi / n_blades), math.sin(2.0 * math.pi / n_blades)
+    for k in range(n_blades):
+        row = work.blade[first + k]
+        beta, beta_rate = blade_angle(x, flap, flap_rate, n_blades, k, cosine, sine, omega)
+        xi = xi_rate = 0.0
+        if lead_lag == 1:
+            xi, xi_rate = blade_angle(x, lag, lag_rate, n_blades, k, cosine, sine, omega)
+        row[P.COSINE], row[P.SINE] = cosine, sine
+        row[P.FLAP_ANGLE], row[P.LAG_ANGLE] = beta, xi
+        pitch = _pitch(rotor, swash[j], cosine, sine) - rotor[P.PITCH_FLAP] * beta - rotor[P.PITCH_LAG] * xi
+        gradient = cyclic * omega * (lambdac * cosine + lambdas * sine)
+        induced = omega * rotor[P.RADIUS] * lambda0
+        lift, c, s, p1, p2, cb, sb = blade_terms(
+            p, j, row, beta, beta_rate, xi, xi_rate, cosine, sine, pitch, induced, gradient, flow, rates, base, hang
+        )
+        add_inertia(p, j, work.rotor_inertia[j], c, s, p1, p2, cb, sb)
+        thrust += lift
+        sine_moment += row[P.NORMAL_MOMENT] * sine
+        cosine_moment += row[P.NORMAL_MOMENT] * cosine
+        cosine, sine = cosine * step_c - sine * step_s, sine * step_c + cosine * step_s
+    work.aero[j, 0], work.aero[j, 1], work.aero[j, 2] = thrust, sine_moment, cosine_moment
+
+
+@kernel
+def _to_hub(a, x, y, z):
+    """Components in hub axes of a vector in body axes."""
+    return (
+        a[0, 0] * x + a[1, 0] * y + a[2, 0] * z,
+        a[0, 1] * x + a[1, 1] * y + a[2, 1] * z,
+        a[0, 2] * x + a[1, 2] * y + a[2, 2] * z,
+    )
+
+
+@kernel
+def _pitch(rotor, swash, cosine, sine):
+    """Pitch of a blade at the hinge [rad]: theta0 - A1s G cos(psi + phase) - B1s sin(psi + phase)."""
+    c = cosine * rotor[P.COS_PHASE] - sine * rotor[P.SIN_PHASE]
+    s = sine * rotor[P.COS_PHASE] + cosine * rotor[P.SIN_PHASE]
+    return swash[0] - rotor[P.SENSE] * swash[1] * c - swash[2] * s
+
+
+@kernel
+def _start_body_system(p, air, om, work):
+    """Right-hand side of the rigid part and the ducts: external loads minus what the rotation takes."""
+    b = work.vector
+    body = p.body
+    fx, fy, fz = plate_drag(
+        p.air[P.DENSITY], p.air[P.PLATE_X], p.air[P.PLATE_Y], p.air[P.PLATE_Z], air[0], air[1], air[2]
+    )
+    sx, sy, sz = body[P.FIRST_MOMENT], body[P.FIRST_MOMENT + 1], body[P.FIRST_MOMENT + 2]
+    t = cross(om[0], om[1], om[2], sx, sy, sz)
+    t = cross(om[0], om[1], om[2], t[0], t[1], t[2])
+    i = P.INERTIA
+    hx = body[i] * om[0] + body[i + 1] * om[1] + body[i + 2] * om[2]
+    hy = body[i + 3] * om[0] + body[i + 4] * om[1] + body[i + 5] * om[2]
+    hz = body[i + 6] * om[0] + body[i + 7] * om[1] + body[i + 8] * om[2]
+    gyro = cross(om[0], om[1], om[2], hx, hy, hz)
+    b[0], b[1], b[2] = fx - t[0], fy - t[1], fz - t[2]
+    b[3], b[4], b[5] = -gyro[0], -gyro[1], -gyro[2]
+    for j in range(p.rotor.shape[0]):
+        a = p.axes[j]
+        thrust = duct_thrust(p.rotor[j, P.DUCT], work.aero[j, 0])
+        fx, fy, fz = -a[0, 2] * thrust, -a[1, 2] * thrust, -a[2, 2] * thrust
+        hx, hy, hz = p.rotor[j, P.HUB_X], p.rotor[j, P.HUB_Y], p.rotor[j, P.HUB_Z]
+        m = cross(hx, hy, hz, fx, fy, fz)
+        b[0] += fx
+        b[1] += fy
+        b[2] += fz
+        b[3] += m[0]
+        b[4] += m[1]
+        b[5] += m[2]
+
+
+@kernel
+def _solve_with_blades(p, work):
+    """Specific force and angular acceleration of the body with all blades eliminated (`complete`)."""
+    k, b = work.matrix, work.vector
+    _rigid_matrix(p, work)
+    lead_lag = p.switches[P.LEAD_LAG]
+    for j in range(p.rotor.shape[0]):
+        inverse_a1 = 1.0 / p.rotor[j, P.A1]
+        for i in range(p.first_blade[j], p.first_blade[j + 1]):
+            row = work.blade[i]
+            for m in range(6):
+                b[m] += row[P.BASE_LOAD + m]
+            _eliminate(k, b, row, P.FLAP_COUPLING, row[P.FLAP_MOMENT], inverse_a1)
+            if lead_lag == 1:
+                _eliminate(k, b, row, P.LAG_COUPLING, row[P.LAG_MOMENT], 1.0 / row[P.A2])
+    _solve_symmetric(k, b)
+
+
+@kernel
+def _eliminate(k, b, row, at, moment, inverse_inertia):
+    """Take one hinge coordinate out of the body's system; only the lower triangle is kept."""
+    for m in range(6):
+        scaled = row[at + m] * inverse_inertia
+        b[m] -= scaled * moment
+        for n in range(m + 1):
+            k[m, n] -= scaled * row[at + n]
+
+
+@kernel
+def _rigid_matrix(p, work):
+    """Mass matrix of the rigid part and all blades as if locked, about the c.g.; lower triangle."""
+    k = work.matrix
+    k[:, :] = 0.0
+    body = p.body
+    mass = body[P.MASS]
+    sx, sy, sz = body[P.FIRST_MOMENT], body[P.FIRST_MOMENT + 1], body[P.FIRST_MOMENT + 2]
+    xx = yy = zz = xy = yz = zx = 0.0
+    for j in range(p.rotor.shape[0]):
+        t = work.rotor_inertia[j]
+        mass += t[0]
+        sx += t[1]
+        sy += t[2]
+        sz += t[3]
+        xx += t[4]
+        yy += t[5]
+        zz += t[6]
+        xy += t[7]
+        yz += t[8]
+        zx += t[9]
+    k[0, 0] = k[1, 1] = k[2, 2] = mass
+    k[3, 1], k[3, 2] = -sz, sy
+    k[4, 0], k[4, 2] = sz, -sx
+    k[5, 0], k[5, 1] = -sy, sx
+    i = P.INERTIA
+    k[3, 3] = body[i] + yy + zz
+    k[4, 3] = body[i + 3] - xy
+    k[4, 4] = body[i + 4] + zz + xx
+    k[5, 3] = body[i + 6] - zx
+    k[5, 4] = body[i + 7] - yz
+    k[5, 5] = body[i + 8] + xx + yy
+
+
+@kernel
+def _solve_symmetric(k, b):
+    """Solve k x = b in place for a symmetric positive definite k by L D L^T; lower triangle is read."""
+    for m in range(6):
+        for n in range(m):
+            value = k[m, n]
+            for i in range(n):
+                value -= k[m, i] * k[n, i] * k[i, i]
+            k[m, n] = value / k[n, n]
+        value = k[m, m]
+        for i in range(m):
+            value -= k[m, i] * k[m, i] * k[i, i]
+        k[m, m] = value
+        for i in range(m):
+            b[m] -= k[m, i] * b[i]
+    for m in range(6):
+        b[m] /= k[m, m]
+    for m in range(5, -1, -1):
+        for i in range(m + 1, 6):
+            b[m] -= k[i, m] * b[i]
+
+
+@kernel
+def _solve_blades(p, work):
+    """Flap and lag accelerations of every blade under the body's motion (`complete`)."""
+    b = work.vector
+    for j in range(p.rotor.shape[0]):
+        for i in range(p.first_blade[j], p.first_blade[j + 1]):
+            row = work.blade[i]
+            flap, lag = row[P.FLAP_MOMENT], row[P.LAG_MOMENT]
+            for m in range(6):
+                flap -= row[P.FLAP_COUPLING + m] * b[m]
+                lag -= row[P.LAG_COUPLING + m] * b[m]
+            row[P.FLAP_ACCELERATION] = flap / p.rotor[j, P.A1]
+            row[P.LAG_ACCELERATION] = lag / row[P.A2] * p.switches[P.LEAD_LAG]
+
+
+@kernel
+def _solve_blades_alone(p, work):
+    """Flap and lag accelerations of every blade on a hub that does not accelerate (`paper`)."""
+    for j in range(p.rotor.shape[0]):
+        for i in range(p.first_blade[j], p.first_blade[j + 1]):
+            row = work.blade[i]
+            row[P.FLAP_ACCELERATION] = row[P.FLAP_MOMENT] / p.rotor[j, P.A1]
+            row[P.LAG_ACCELERATION] = row[P.LAG_MOMENT] / row[P.A2] * p.switches[P.LEAD_LAG]
+
+
+@kernel
+def _hub_loads(p, om, work):
+    """Force and moment of each rotor on its hub, thrust and shaft torque, into `work.loads`."""
+    complete = p.switches[P.COMPLETE_COUPLING] == 1
+    b = work.vector
+    for j in range(p.rotor.shape[0]):
+        out = work.loads[j]
+        out[:] = 0.0
+        for i in range(p.first_blade[j], p.first_blade[j + 1]):
+            row = work.blade[i]
+            flap, lag = row[P.FLAP_ACCELERATION], row[P.LAG_ACCELERATION]
+            for m in range(6):
+                out[P.FORCE + m] += (
+                    row[P.BASE_LOAD + m] - row[P.FLAP_COUPLING + m] * flap - row[P.LAG_COUPLING + m] * lag
+                )
+        if complete:
+            _subtract_carried_blades(work.rotor_inertia[j], b, out)
+        hx, hy, hz = p.rotor[j, P.HUB_X], p.rotor[j, P.HUB_Y], p.rotor[j, P.HUB_Z]
+        arm = cross(hx, hy, hz, out[P.FORCE], out[P.FORCE + 1], out[P.FORCE + 2])
+        for m in range(3):
+            out[P.MOMENT + m] -= arm[m]
+        if p.switches[P.COMPLETE_HUB_MOMENT] == 0:
+            _paper_hub_moment(p, j, work)
+        a = p.axes[j]
+        axial = a[0, 2] * out[P.MOMENT] + a[1, 2] * out[P.MOMENT + 1] + a[2, 2] * out[P.MOMENT + 2]
+        out[P.THRUST] = work.aero[j, 0]
+        out[P.TORQUE] = p.rotor[j, P.SENSE] * axial
+
+
+@kernel
+def _subtract_carried_blades(t, b, out):
+    """Take from a rotor's load what accelerates its blades along with the body, about the c.g."""
+    f = cross(b[3], b[4], b[5], t[1], t[2], t[3])
+    m = cross(t[1], t[2], t[3], b[0], b[1], b[2])
+    out[P.FORCE] -= t[0] * b[0] + f[0]
+    out[P.FORCE + 1] -= t[0] * b[1] + f[1]
+    out[P.FORCE + 2] -= t[0] * b[2] + f[2]
+    out[P.MOMENT] -= m[0] + (t[5] + t[6]) * b[3] - t[7] * b[4] - t[9] * b[5]
+    out[P.MOMENT + 1] -= m[1] + (t[6] + t[4]) * b[4] - t[7] * b[3] - t[8] * b[5]
+    out[P.MOMENT + 2] -= m[2] + (t[4] + t[5]) * b[5] - t[9] * b[3] - t[8] * b[4]
+
+
+@kernel
+def _paper_hub_moment(p, j, work):
+    """Replace the moment across the shaft by the paper's reading (MODEL.md section 9)."""
+    out = work.loads[j]
+    a = p.axes[j]
+    axial = a[0, 2] * out[P.MOMENT] + a[1, 2] * out[P.MOMENT + 1] + a[2, 2] * out[P.MOMENT + 2]
+    inertia = p.rotor[j, P.A1_HUB] * p.switches[P.LEAD_LAG]
+    for m in range(3):
+        out[P.MOMENT + m] = axial * a[m, 2]
+    for i in range(p.first_blade[j], p.first_blade[j + 1]):
+        row = work.blade[i]
+        for m in range(3):
+            inertial = inertia * row[P.FLAP_ACCELERATION] * row[P.FLAP_AXIS + m]
+            out[P.MOMENT + m] += row[P.PAPER_MOMENT + m] - inertial
+
+
+@kernel
+def _solve_body_alone(p, work):
+    """Specific force and angular acceleration of the rigid aircraft under the hub loads (`paper`)."""
+    k, b = work.matrix, work.vector
+    for j in range(p.rotor.shape[0]):
+        out = work.loads[j]
+        hx, hy, hz = p.rotor[j, P.HUB_X], p.rotor[j, P.HUB_Y], p.rotor[j, P.HUB_Z]
+        arm = cross(hx, hy, hz, out[P.FORCE], out[P.FORCE + 1], out[P.FORCE + 2])
+        for m in range(3):
+            b[m] += out[P.FORCE + m]
+            b[3 + m] += out[P.MOMENT + m] + arm[m]
+    k[:, :] = 0.0
+    i = P.INERTIA
+    k[0, 0] = k[1, 1] = k[2, 2] = p.body[P.MASS]
+    for m in range(3):
+        for n in range(m + 1):
+            k[3 + m, 3 + n] = p.body[i + 3 * m + n]
+    _solve_symmetric(k, b)
+
+
+@kernel
+def _body_rates(x, rot, om, g, acceleration, dx):
+    """Rates of position, attitude, velocity and angular velocity (MODEL.md section 5)."""
+    u, v, w = x[7], x[8], x[9]
+    dx[0] = rot[0] * u + rot[1] * v + rot[2] * w
+    dx[1] = rot[3] * u + rot[4] * v + rot[5] * w
+    dx[2] = rot[6] * u + rot[7] * v + rot[8] * w
+    dx[3], dx[4], dx[5], dx[6] = quaternion_rates(x[3], x[4], x[5], x[6], om[0], om[1], om[2])
+    turn = cross(om[0], om[1], om[2], u, v, w)
+    dx[7] = acceleration[0] + g[0] - turn[0]
+    dx[8] = acceleration[1] + g[1] - turn[1]
+    dx[9] = acceleration[2] + g[2] - turn[2]
+    dx[10], dx[11], dx[12] = acceleration[3], acceleration[4], acceleration[5]
+
+
+@kernel
+def _rotor_rates(p, x, work, dx):
+    """Rates of the multiblade coordinates (paper eqs. [13], [14]) and of the inflow."""
+    all_blades = p.first_blade[-1]
+    lead_lag = p.switches[P.LEAD_LAG]
+    flaps, flap_rates = S.BODY_SIZE, S.BODY_SIZE + all_blades
+    lags, lag_rates = S.BODY_SIZE + 2 * all_blades, S.BODY_SIZE + 3 * all_blades
+    for i in range(all_blades):
+        dx[flaps + i] = x[flap_rates + i]
+        dx[flap_rates + i] = 0.0
+        dx[lags + i] = lead_lag * x[lag_rates + i]
+        dx[lag_rates + i] = 0.0
+    for j in range(p.rotor.shape[0]):
+        rotor = p.rotor[j]
+        first = p.first_blade[j]
+        n_blades = p.first_blade[j + 1] - first
+        omega = rotor[P.SPEED]
+        for k in range(n_blades):
+            row = work.blade[first + k]
+            c, s = row[P.COSINE], row[P.SINE]
+            add_blade_acceleration(dx, flap_rates + first, n_blades, k, c, s, row[P.FLAP_ACCELERATION])
+            add_blade_acceleration(dx, lag_rates + first, n_blades, k, c, s, row[P.LAG_ACCELERATION])
+        add_rotation_terms(x, dx, flaps + first, flap_rates + first, n_blades, omega, 1.0)
+        add_rotation_terms(x, dx, lags + first, lag_rates + first, n_blades, omega, 1.0 * lead_lag)
+        _inflow(p, j, x, work, dx)
+
+
+@kernel
+def _inflow(p, j, x, work, dx):
+    """Inflow rates of rotor j from the sums of its blades."""
+    rotor = p.rotor[j]
+    at = S.BODY_SIZE + 4 * p.first_blade[-1] + 3 * j
+    radius, omega = rotor[P.RADIUS], rotor[P.SPEED]
+    tip = omega * radius
+    flow = work.hub_flow[j]
+    # in vacuum the coefficients are zero, not zero over zero
+    density = p.air[P.DENSITY]
+    scale = 0.0 if density <= 0.0 else 1.0 / (density * math.pi * radius * radius * tip * tip)
+    dx[at], dx[at + 1], dx[at + 2] = inflow_rates(
+        x[at],
+        x[at + 1],
+        x[at + 2],
+        flow[0] / tip,
+        flow[1] / tip,
+        flow[2] / tip,
+        rotor[P.SENSE],
+        rotor[P.DUCT],
+        omega,
+        work.aero[j, 0] * scale,
+        work.aero[j, 1] * scale / radius,
+        work.aero[j, 2] * scale / radius,
+        p.switches[P.CYCLIC_INFLOW],
+    )

@@ -1,0 +1,69 @@
+"""How this package compiles its numerical functions.
+
+Two decorators: `kernel` for the pieces, which vanish into their callers, and `entry` for the few
+functions that Python calls, whose machine code is kept on disk.
+"""
+
+import contextlib
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numba
+
+# Everything that `fastmath` means except "there is no NaN" and "there is no infinity": the checks that
+# keep such numbers out of the state must survive the optimiser.
+FASTMATH = {"reassoc", "contract", "arcp", "nsz", "afn"}
+
+
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a piece of the model; it is inlined where it is called and leaves nothing on disk."""
+    return numba.njit(nogil=True, error_model="numpy", fastmath=FASTMATH, forceinline=True)(function)
+
+
+def entry(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk."""
+    with _cache_in(_cache_folder()):
+        return numba.njit(nogil=True, error_model="numpy", fastmath=FASTMATH, cache=True)(function)
+
+
+def _cache_folder() -> Path:
+    """Where the machine code of these very sources is kept.
+
+    numba asks only whether the file of the function itself has changed, not the files of what it calls.
+    A folder named after the content of all of them can never hold stale physics.
+    """
+    here = Path(__file__).parent
+    sources = sorted([*here.glob("*.py"), *(here.parent / "analysis").glob("*.py")])
+    digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if chosen:
+        return Path(chosen) / f"sbs_sim-{digest}"
+    beside = here / "__pycache__" / f"kernels-{digest}"
+    if _writable(beside):
+        return beside
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    kept = home / "sbs_sim" / f"kernels-{digest}"
+    return kept if _writable(kept) else Path(tempfile.gettempdir()) / f"sbs_sim-{os.getuid()}-{digest}"
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
+
+
+@contextlib.contextmanager
+def _cache_in(folder: Path) -> Iterator[None]:
+    """Let numba place caches in a folder for the functions decorated meanwhile, and nowhere else."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder)
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = before

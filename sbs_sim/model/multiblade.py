@@ -1,0 +1,73 @@
+"""Multiblade (Coleman) coordinates of a rotor with three or more blades (MODEL.md section 1).
+
+beta_k = a0 - sum_n (a_n cos n psi_k + b_n sin n psi_k) + a_d (-1)^k, n = 1 .. (N_b - 1) / 2, with the differential
+coordinate a_d for even N_b only: N_b coordinates for N_b blades, one to one. Lag alike.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.model.kernel import kernel
+
+Array = NDArray[np.float64]
+
+
+def blade_matrix(blades: int, azimuth: float) -> Array:
+    """T with blade angles = T @ coordinates, shape (blades, blades), the first blade at `azimuth` [rad]."""
+    columns = [np.ones(blades)]
+    psi = azimuth + 2 * math.pi * np.arange(blades) / blades
+    for harmonic in range(1, (blades - 1) // 2 + 1):
+        columns += [-np.cos(harmonic * psi), -np.sin(harmonic * psi)]
+    if blades % 2 == 0:
+        columns.append((-1.0) ** np.arange(blades))
+    return np.stack(columns, axis=1)
+
+
+@kernel
+def blade_angle(x, angles, rates, n_blades, blade, cosine, sine, speed):
+    """Angle [rad] and rate [rad/s] of one blade from the coordinates of its rotor.
+
+    `angles` and `rates` are the places of the first coordinate and its rate in the state x; cosine and sine are
+    those of the blade's azimuth, which grows at `speed` [rad/s].
+    """
+    angle = x[angles]
+    rate = x[rates]
+    cn, sn = cosine, sine
+    for n in range(1, (n_blades - 1) // 2 + 1):
+        i = 2 * n - 1
+        a, b = x[angles + i], x[angles + i + 1]
+        angle -= a * cn + b * sn
+        rate += n * speed * (a * sn - b * cn) - x[rates + i] * cn - x[rates + i + 1] * sn
+        cn, sn = cn * cosine - sn * sine, sn * cosine + cn * sine
+    if n_blades % 2 == 0:
+        sign = 1.0 - 2.0 * (blade % 2)
+        angle += sign * x[angles + n_blades - 1]
+        rate += sign * x[rates + n_blades - 1]
+    return angle, rate
+
+
+@kernel
+def add_blade_acceleration(dx, rates, n_blades, blade, cosine, sine, acceleration):
+    """Add what one blade's acceleration [rad/s^2] gives to the accelerations of the coordinates."""
+    share = acceleration / n_blades
+    dx[rates] += share
+    cn, sn = cosine, sine
+    for n in range(1, (n_blades - 1) // 2 + 1):
+        i = rates + 2 * n - 1
+        dx[i] -= 2.0 * share * cn
+        dx[i + 1] -= 2.0 * share * sn
+        cn, sn = cn * cosine - sn * sine, sn * cosine + cn * sine
+    if n_blades % 2 == 0:
+        dx[rates + n_blades - 1] += (1.0 - 2.0 * (blade % 2)) * share
+
+
+@kernel
+def add_rotation_terms(x, dx, angles, rates, n_blades, speed, factor):
+    """Add `factor` times -K1 q' - K0 q (paper eqs. [26], [27]): what the turning of the coordinates gives."""
+    for n in range(1, (n_blades - 1) // 2 + 1):
+        i = 2 * n - 1
+        harmonic = n * speed
+        dx[rates + i] += factor * harmonic * (harmonic * x[angles + i] - 2.0 * x[rates + i + 1])
+        dx[rates + i + 1] += factor * harmonic * (harmonic * x[angles + i + 1] + 2.0 * x[rates + i])

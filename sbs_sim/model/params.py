@@ -1,0 +1,162 @@
+"""What the compiled model knows of an aircraft: one tuple of flat arrays.
+
+Rows and columns have names here; `Aircraft.params` fills them. Compiled code reads them by these constants,
+which the compiler folds.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# air: columns
+DENSITY, INVERSE_VISCOSITY, GRAVITY, PLATE_X, PLATE_Y, PLATE_Z = range(6)
+AIR_SIZE = 6
+
+# switches: columns; all 0 or 1
+LEAD_LAG, CYCLIC_INFLOW, COMPLETE_COUPLING, COMPLETE_HUB_MOMENT = range(4)
+SWITCH_COUNT = 4
+
+# body: mass [kg], first moment about the c.g. [kg m], inertia row by row [kg m^2], total mass [kg]
+MASS, FIRST_MOMENT, INERTIA, TOTAL_MASS = 0, 1, 4, 13
+BODY_SIZE = 14
+
+# rotor: columns, SI units
+(
+    SPEED,  # Omega
+    RADIUS,  # R
+    SENSE,  # G, +1 counter-clockwise seen from above
+    HINGE,  # e_0
+    LAG_HINGE,  # e_L = e_0 - e_F
+    FLAP_HINGE,  # e_F
+    BLADE_MASS,  # m_b
+    S1,  # m_b r_G
+    A1,  # second moment of the blade in the blade equations
+    A1_HUB,  # second moment of the blade in the hub loads
+    FLAP_SPRING,
+    LAG_SPRING,
+    LAG_DAMPING,
+    PITCH_FLAP,
+    PITCH_LAG,
+    COS_PHASE,  # swashplate phase
+    SIN_PHASE,
+    DUCT,  # a_w
+    HUB_X,
+    HUB_Y,
+    HUB_Z,
+) = range(21)
+ROTOR_SIZE = 21
+
+# element: rows per rotor; the last axis runs along the blade
+SPAN, CHORD, HALF_AREA, LIFT_FRACTION, TWIST = range(5)
+ELEMENT_ROWS = 5
+
+# loads: columns of one rotor's outputs; forces and moments in body axes about the hub centre
+THRUST, TORQUE, FORCE, MOMENT = 0, 1, 2, 5
+LOAD_SIZE = 8
+
+
+class Params(NamedTuple):
+    """The aircraft as arrays, with its fidelity switches.
+
+    Attributes
+    ----------
+    air : ndarray, shape (AIR_SIZE,)
+    body : ndarray, shape (BODY_SIZE,)
+        The rigid part: the fuselage without blades (`complete` coupling) or the whole aircraft (`paper`).
+    switches : ndarray of int64, shape (SWITCH_COUNT,)
+    first_blade : ndarray of int64, shape (n_rotors + 1,)
+        Index of each rotor's first blade among all blades; the last entry is the number of blades.
+    rotor : ndarray, shape (n_rotors, ROTOR_SIZE)
+    axes : ndarray, shape (n_rotors, 3, 3)
+        Hub axes as columns in body components.
+    element : ndarray, shape (n_rotors, ELEMENT_ROWS, n_elements)
+        Distance from the flap hinge [m], chord [m], c ds / 2 [m^2], lift fraction (tip loss), twist [rad].
+    cells : ndarray, shape (n_cells, 8)
+        Bilinear coefficients of every airfoil table cell, see `sbs_sim.model.airfoil.cells`.
+    grid_index : ndarray of int64, shape (n_rotors, 3)
+        First row in `cells`, number of angle cells, number of Reynolds knots of the rotor's airfoil.
+    grid : ndarray, shape (n_rotors, 2 + most Reynolds knots)
+        First angle [rad], inverse angle step [1/rad], Reynolds knots.
+    """
+
+    air: Array
+    body: Array
+    switches: IntArray
+    first_blade: IntArray
+    rotor: Array
+    axes: Array
+    element: Array
+    cells: Array
+    grid_index: IntArray
+    grid: Array
+
+
+# blade: columns of the work row of one blade; six-vectors are force and moment, body axes, about the c.g.
+FLAP_COUPLING, LAG_COUPLING, BASE_LOAD = 0, 6, 12  # what a unit beta'', xi'' takes, and the load without them
+FLAP_MOMENT, LAG_MOMENT, A2, COSINE, SINE, FLAP_ANGLE, LAG_ANGLE = range(18, 25)
+FLAP_ACCELERATION, LAG_ACCELERATION, NORMAL_MOMENT = range(25, 28)
+PAPER_MOMENT = 28  # moment about the hub in the paper's reading without its inertial part, body axes
+FLAP_AXIS = 31  # unit vector f, body axes
+BLADE_SIZE = 34
+
+# inertia: columns of the mass, first moment and six second moments of one rotor's blades about the c.g.
+INERTIA_SIZE = 10
+
+
+class Work(NamedTuple):
+    """Memory of the compiled model, made once by `make_work`; nothing in it outlives a call but the outputs.
+
+    Attributes
+    ----------
+    blade : ndarray, shape (n_blades, BLADE_SIZE)
+    rotor_inertia : ndarray, shape (n_rotors, INERTIA_SIZE)
+    loads : ndarray, shape (n_rotors, LOAD_SIZE)
+        Output: thrust [N], torque [N m], hub force [N] and moment [N m] of the last derivative.
+    aero : ndarray, shape (n_rotors, 3)
+        Thrust and the cosine and sine moments that drive the inflow.
+    hub_flow : ndarray, shape (n_rotors, 3)
+        Velocity of the hub relative to the air in hub axes [m/s].
+    matrix : ndarray, shape (6, 6)
+    vector : ndarray, shape (6,)
+        Linear system of the body; after the solution: specific force of the c.g. [m/s^2], om' [rad/s^2].
+    stages : ndarray, shape (4, state size)
+        Stage state, its derivative, the running sum and the derivative at the start of a step.
+    psi : ndarray, shape (n_rotors,)
+        Azimuths of a stage [rad].
+    wind : ndarray, shape (3,)
+        Wind of a stage, NED [m/s].
+    """
+
+    blade: Array
+    rotor_inertia: Array
+    loads: Array
+    aero: Array
+    hub_flow: Array
+    matrix: Array
+    vector: Array
+    stages: Array
+    psi: Array
+    wind: Array
+
+
+def make_work(params: Params) -> Work:
+    """Work arrays for an aircraft; one set per thread."""
+    rotors = len(params.rotor)
+    blades = int(params.first_blade[-1])
+    size = 13 + 4 * blades + 3 * rotors
+    return Work(
+        blade=np.zeros((blades, BLADE_SIZE)),
+        rotor_inertia=np.zeros((rotors, INERTIA_SIZE)),
+        loads=np.zeros((rotors, LOAD_SIZE)),
+        aero=np.zeros((rotors, 3)),
+        hub_flow=np.zeros((rotors, 3)),
+        matrix=np.zeros((6, 6)),
+        vector=np.zeros(6),
+        stages=np.zeros((4, size)),
+        psi=np.zeros(rotors),
+        wind=np.zeros(3),
+    )

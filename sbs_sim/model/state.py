@@ -1,0 +1,184 @@
+"""The vectors of the model: states, controls, outputs; their names, units and places.
+
+Everything that reads or writes a state vector (dynamics, trim, linearization, recorder, messages) takes the
+places from here. Two vectors describe the same aircraft:
+
+simulation state, 13 + 4 n_blades + 3 n_rotors values
+    position (NED, m) | attitude (unit quaternion w, x, y, z: body FRD to NED) | velocity u, v, w (body, m/s) |
+    angular velocity p, q, r (body, rad/s) | flap of all rotors | flap rates | lag | lag rates | inflow
+linear state, 8 + 4 n_blades + 3 n_rotors values (38 for two three-bladed rotors; eq. [18] of the paper)
+    u w q theta v p phi r | flap | flap rates | lag | lag rates | inflow
+
+Flap and lag are multiblade coordinates (MODEL.md section 1), inflow is lambda0, lambdas, lambdac per rotor.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.model import frames
+
+Array = NDArray[np.float64]
+
+POSITION, ATTITUDE, VELOCITY, RATES = 0, 3, 7, 10  # first index of each part of the simulation state
+BODY_SIZE = 13
+LINEAR_BODY_SIZE = 8
+LINEAR_BODY_NAMES = ("u", "w", "q", "theta", "v", "p", "phi", "r")
+LINEAR_BODY_UNITS = ("m/s", "m/s", "rad/s", "rad", "m/s", "rad/s", "rad", "rad/s")
+CONTROL_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")
+SWASHPLATE_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic")
+INFLOW_NAMES = ("lambda0", "lambdas", "lambdac")
+
+
+def multiblade_suffixes(blades: int) -> tuple[str, ...]:
+    """Names of the coordinates of one rotor: collective, cosine and sine of each harmonic, differential.
+
+    Parameters
+    ----------
+    blades : int
+        Number of blades, at least 3.
+
+    Returns
+    -------
+    tuple of str, length `blades`
+        ("0", "c", "s") for three blades, then ("2c", "2s"), ... and "d" last for an even number.
+    """
+    names = ["0", "c", "s"]
+    for harmonic in range(2, (blades - 1) // 2 + 1):
+        names += [f"{harmonic}c", f"{harmonic}s"]
+    return tuple(names + ["d"] if blades % 2 == 0 else names)
+
+
+@dataclass(frozen=True)
+class StateLayout:
+    """Places and names of all states of an aircraft.
+
+    Parameters
+    ----------
+    blades : tuple of int
+        Number of blades of each rotor, in the order of the aircraft file.
+    """
+
+    blades: tuple[int, ...]
+
+    @cached_property
+    def blade_count(self) -> int:
+        """Number of blades of all rotors together."""
+        return sum(self.blades)
+
+    @cached_property
+    def size(self) -> int:
+        """Length of the simulation state."""
+        return BODY_SIZE + 4 * self.blade_count + 3 * len(self.blades)
+
+    @cached_property
+    def linear_size(self) -> int:
+        """Length of the linear state: 38 for two three-bladed rotors."""
+        return self.size - BODY_SIZE + LINEAR_BODY_SIZE
+
+    def _multiblade(self, block: int, rotor: int) -> slice:
+        first = BODY_SIZE + block * self.blade_count + sum(self.blades[:rotor])
+        return slice(first, first + self.blades[rotor])
+
+    def flap(self, rotor: int) -> slice:
+        """Place of one rotor's flap coordinates in the simulation state [rad]."""
+        return self._multiblade(0, rotor)
+
+    def flap_rate(self, rotor: int) -> slice:
+        """Place of one rotor's flap coordinate rates [rad/s]."""
+        return self._multiblade(1, rotor)
+
+    def lag(self, rotor: int) -> slice:
+        """Place of one rotor's lag coordinates [rad], positive against the rotation."""
+        return self._multiblade(2, rotor)
+
+    def lag_rate(self, rotor: int) -> slice:
+        """Place of one rotor's lag coordinate rates [rad/s]."""
+        return self._multiblade(3, rotor)
+
+    def inflow(self, rotor: int) -> slice:
+        """Place of one rotor's lambda0, lambdas, lambdac in the simulation state."""
+        first = BODY_SIZE + 4 * self.blade_count + 3 * rotor
+        return slice(first, first + 3)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the simulation state."""
+        body = ("north", "east", "down", "qw", "qx", "qy", "qz", "u", "v", "w", "p", "q", "r")
+        return body + self._rotor_names
+
+    @cached_property
+    def linear_names(self) -> tuple[str, ...]:
+        """Names of the linear state, in the paper's order."""
+        return LINEAR_BODY_NAMES + self._rotor_names
+
+    @cached_property
+    def linear_units(self) -> tuple[str, ...]:
+        """Units of the linear state."""
+        angles, rates = ("rad",) * self.blade_count, ("rad/s",) * self.blade_count
+        return LINEAR_BODY_UNITS + angles + rates + angles + rates + ("1",) * (3 * len(self.blades))
+
+    @cached_property
+    def _rotor_names(self) -> tuple[str, ...]:
+        flap = ("a", "b")
+        names: list[str] = []
+        for prefix in ("", "d"):
+            names += [
+                f"{prefix}{_flap_name(suffix, flap)}({rotor + 1})"
+                for rotor, blades in enumerate(self.blades)
+                for suffix in multiblade_suffixes(blades)
+            ]
+        for prefix in ("xi", "dxi"):
+            names += [
+                f"{prefix}{suffix}({rotor + 1})"
+                for rotor, blades in enumerate(self.blades)
+                for suffix in multiblade_suffixes(blades)
+            ]
+        names += [f"{name}({rotor + 1})" for rotor in range(len(self.blades)) for name in INFLOW_NAMES]
+        return tuple(names)
+
+    def to_linear(self, state: Array) -> Array:
+        """Linear state of a simulation state; position and heading are left out.
+
+        Parameters
+        ----------
+        state : ndarray, shape (size,)
+
+        Returns
+        -------
+        ndarray, shape (linear_size,)
+        """
+        u, v, w, p, q, r = state[VELOCITY : VELOCITY + 6]
+        _, theta, phi = frames.quaternion_to_euler(state[ATTITUDE : ATTITUDE + 4])
+        return np.concatenate(([u, w, q, theta, v, p, phi, r], state[BODY_SIZE:]))
+
+    def from_linear(self, linear: Array, heading: float = 0.0) -> Array:
+        """Simulation state at the origin with a given heading [rad] of a linear state.
+
+        Parameters
+        ----------
+        linear : ndarray, shape (linear_size,)
+        heading : float
+            Yaw angle, positive from north to east [rad].
+
+        Returns
+        -------
+        ndarray, shape (size,)
+        """
+        u, w, q, theta, v, p, phi, r = linear[:LINEAR_BODY_SIZE]
+        state = np.zeros(self.size)
+        state[ATTITUDE : ATTITUDE + 4] = frames.euler_to_quaternion(heading, theta, phi)
+        state[VELOCITY : VELOCITY + 6] = u, v, w, p, q, r
+        state[BODY_SIZE:] = linear[LINEAR_BODY_SIZE:]
+        return state
+
+
+def _flap_name(suffix: str, letters: tuple[str, str]) -> str:
+    """The paper's a0, a1, b1 for suffixes 0, c, s; a2, b2 for 2c, 2s; ad for the differential one."""
+    cosine, sine = letters
+    if suffix in ("0", "d"):
+        return cosine + suffix
+    order = suffix[:-1] or "1"
+    return (cosine if suffix.endswith("c") else sine) + order

@@ -1,0 +1,170 @@
+"""Motion of the air: steady wind, 1-cosine gust, Dryden turbulence.
+
+Compiled code sees one flat array per tick: `wind_at` evaluates it at any time within the tick, turbulence being
+linear between the tick's ends.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.errors import SimulationError
+from sbs_sim.model.kernel import kernel
+
+Array = NDArray[np.float64]
+
+# columns of the wind of one tick
+STEADY, GUST, GUST_START, GUST_DURATION, TURBULENCE_FROM, TURBULENCE_TO = 0, 3, 6, 7, 8, 11
+WIND_SIZE = 14
+LARGEST_WIND = 100.0  # m/s; the strongest wind measured at the ground is 113 m/s
+
+
+@kernel
+def wind_at(wind, time, fraction, out):
+    """Velocity of the air, NED [m/s], at a time [s] that lies `fraction` of the way through the tick.
+
+    The gust is peak / 2 (1 - cos(2 pi (t - start) / duration)) (EASA CS-25.341 with time in place of distance).
+    """
+    share = 0.0
+    since = time - wind[GUST_START]
+    duration = wind[GUST_DURATION]
+    if duration > 0.0 and 0.0 <= since <= duration:
+        share = 0.5 * (1.0 - math.cos(2.0 * math.pi * since / duration))
+    for i in range(3):
+        start, end = wind[TURBULENCE_FROM + i], wind[TURBULENCE_TO + i]
+        out[i] = wind[STEADY + i] + share * wind[GUST + i] + start + fraction * (end - start)
+
+
+@dataclass(frozen=True)
+class Wind:
+    """What the air does from now on.
+
+    Parameters
+    ----------
+    velocity : tuple of 3 floats
+        Steady wind, NED, where the air goes to [m/s].
+    gust : tuple of 3 floats
+        Peak of the 1-cosine gust, NED [m/s].
+    gust_delay, gust_duration : float
+        Start after now and length [s]; no gust for a duration of 0.
+    turbulence_intensity : tuple of 3 floats
+        Standard deviation of the Dryden turbulence along the direction in which the field passes, across it and
+        vertically [m/s].
+    turbulence_length : float
+        Dryden length scale of all three components [m].
+    turbulence_airspeed : float
+        Speed at which the frozen field passes the aircraft [m/s].
+    turbulence_direction : float
+        Heading of the longitudinal component, from north to east [rad].
+    turbulence_seed : int
+        Seed of the noise: equal seeds give equal turbulence.
+
+    Raises
+    ------
+    SimulationError
+        For a value that is not finite or out of range, naming field, value and range.
+    """
+
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gust: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gust_delay: float = 0.0
+    gust_duration: float = 0.0
+    turbulence_intensity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turbulence_length: float = 50.0
+    turbulence_airspeed: float = 10.0
+    turbulence_direction: float = 0.0
+    turbulence_seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        for name in ("velocity", "gust", "turbulence_intensity"):
+            least = 0.0 if name == "turbulence_intensity" else -LARGEST_WIND
+            for axis, value in zip("xyz", getattr(self, name), strict=True):
+                _check(f"{name}.{axis}", value, least, LARGEST_WIND, "m/s")
+        _check("gust_delay", self.gust_delay, 0.0, 1e6, "s")
+        _check("gust_duration", self.gust_duration, 0.0, 1e6, "s")
+        _check("turbulence_length", self.turbulence_length, 0.1, 1e4, "m")
+        _check("turbulence_airspeed", self.turbulence_airspeed, 0.1, LARGEST_WIND, "m/s")
+        _check("turbulence_direction", self.turbulence_direction, -10.0, 10.0, "rad")
+        if not 0 <= self.turbulence_seed < 2**64:
+            raise SimulationError(f"turbulence_seed = {self.turbulence_seed}: allowed are 0 to 2^64 - 1")
+
+
+def _check(name: str, value: float, least: float, most: float, unit: str) -> None:
+    if not least <= value <= most:  # false for a NaN as well
+        raise SimulationError(f"{name} = {value}: allowed are {least:g} to {most:g} {unit}")
+
+
+class WindField:
+    """A `Wind` in time: gives the flat array of each tick, in order.
+
+    Parameters
+    ----------
+    wind : Wind
+    start : float
+        Simulation time of the first tick [s].
+    tick : float
+        Length of a tick [s].
+    """
+
+    def __init__(self, wind: Wind, start: float, tick: float) -> None:
+        self.wind = wind
+        self._array = np.zeros(WIND_SIZE)
+        self._array[STEADY : STEADY + 3] = wind.velocity
+        self._array[GUST : GUST + 3] = wind.gust
+        self._array[GUST_START] = start + wind.gust_delay
+        self._array[GUST_DURATION] = wind.gust_duration
+        self._turbulence = None
+        if any(wind.turbulence_intensity):
+            self._turbulence = DrydenTurbulence(wind, tick)
+            self._array[TURBULENCE_TO : TURBULENCE_TO + 3] = self._turbulence.velocity()
+
+    def next_tick(self) -> Array:
+        """Array of the next tick, shape (WIND_SIZE,); the same memory at every call."""
+        if self._turbulence is not None:
+            ends = self._array[TURBULENCE_TO : TURBULENCE_TO + 3]
+            self._array[TURBULENCE_FROM : TURBULENCE_FROM + 3] = ends
+            self._turbulence.advance()
+            ends[:] = self._turbulence.velocity()
+        return self._array
+
+
+class DrydenTurbulence:
+    """Dryden turbulence as filtered noise, sampled exactly at every tick (MIL-F-8785C, section 3.7).
+
+    Longitudinal: H(s) = sigma sqrt(2 T) / (1 + T s); lateral and vertical: H(s) = sigma sqrt(T) (1 + sqrt(3) T s) /
+    (1 + T s)^2 with T = L / V, driven by white noise of unit two-sided density. Both are discretised exactly, so the
+    variance is sigma^2 for any tick.
+    """
+
+    def __init__(self, wind: Wind, tick: float) -> None:
+        time = wind.turbulence_length / wind.turbulence_airspeed
+        self._random = np.random.Generator(np.random.PCG64(wind.turbulence_seed))
+        self._sigma = np.array(wind.turbulence_intensity)
+        c, s = math.cos(wind.turbulence_direction), math.sin(wind.turbulence_direction)
+        self._to_ned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        ratio = tick / time
+        self._decay = math.exp(-ratio)
+        # States of 1/(1 + T s) and 1/(1 + T s)^2 in units of time T: z1' = -z1 + n, z2' = -z2 + z1.
+        self._step = self._decay * np.array([[1.0, 0.0], [ratio, 1.0]])
+        stationary = np.array([[0.5, 0.25], [0.25, 0.25]])
+        self._noise = np.linalg.cholesky(stationary - self._step @ stationary @ self._step.T)
+        # the field is already there when the flight begins: start from its stationary distribution
+        self._states = np.linalg.cholesky(stationary) @ self._random.standard_normal((2, 2))
+        self._longitudinal = math.sqrt(0.5) * self._random.standard_normal()
+
+    def advance(self) -> None:
+        """Go on by one tick."""
+        noise = self._random.standard_normal((2, 3))
+        self._states = self._step @ self._states + self._noise @ noise[:, :2]
+        spread = math.sqrt(0.5 * (1.0 - self._decay * self._decay))
+        self._longitudinal = self._decay * self._longitudinal + spread * noise[0, 2]
+
+    def velocity(self) -> Array:
+        """Velocity of the air now, NED [m/s], shape (3,)."""
+        # (1 + sqrt(3) s) / (1 + s)^2 = sqrt(3) / (1 + s) + (1 - sqrt(3)) / (1 + s)^2
+        across = math.sqrt(3.0) * self._states[0] + (1.0 - math.sqrt(3.0)) * self._states[1]
+        filtered = np.array([math.sqrt(2.0) * self._longitudinal, across[0], across[1]])
+        return self._to_ned @ (self._sigma * filtered)

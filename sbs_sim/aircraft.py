@@ -275,7 +275,7 @@ class Aircraft:
             first_blade=np.cumsum([0, *(rotor.blades for rotor in self.rotors)]).astype(np.int64),
             rotor=np.stack([self._rotor_row(rotor) for rotor in self.rotors]),
             axes=np.stack([hub_axes(rotor.shaft_direction) for rotor in self.rotors]),
-            element=np.stack([rotor.elements(self.options.elements) for rotor in self.rotors]),
+            element=np.stack([_filled_up(rotor.elements(self.options.elements)) for rotor in self.rotors]),
             cells=np.concatenate(tables),
             grid_index=index,
             grid=grid,
@@ -453,6 +453,14 @@ def _airfoil_grids(aircraft: Aircraft, first_rows: dict[str, int]) -> tuple[P.In
         grid[j, :2] = alpha0, inverse_step
         grid[j, 2 : 2 + knots] = table.reynolds
     return index, grid
+
+
+def _filled_up(elements: Array) -> Array:
+    """Elements with copies of the last one, but without area, up to a whole number of vector registers."""
+    missing = -elements.shape[1] % P.REGISTER
+    fill = np.repeat(elements[:, -1:], missing, axis=1)
+    fill[P.HALF_AREA] = 0.0
+    return np.ascontiguousarray(np.concatenate([elements, fill], axis=1))
 
 
 def _blades_inertia(rotor: Rotor) -> Array:

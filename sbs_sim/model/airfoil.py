@@ -74,9 +74,10 @@ def viterna(
     -------
     cl, cd : ndarray, same shape as alpha
 
-    References ---------- MODEL.md section 4. L. A. Viterna, R. D. Corrigan: Fixed pitch rotor performance
-    of large horizontal axis wind turbines, NASA CP-2230, 1982. Reflection as in AirfoilPrep (National
-    Renewable Energy Laboratory).
+    References
+    ----------
+    MODEL.md section 4. L. A. Viterna, R. D. Corrigan: Fixed pitch rotor performance of large horizontal axis
+    wind turbines, NASA CP-2230, 1982. Reflection as in AirfoilPrep (National Renewable Energy Laboratory).
     """
     magnitude = np.abs(np.asarray(alpha, dtype=np.float64))
     is_reversed = magnitude > np.pi / 2
@@ -175,7 +176,7 @@ def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
 def _read_rows(path: Path) -> tuple[Array, list[int]]:
     """All rows as numbers, shape (n, 4), and the line number of each."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise AirfoilError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -222,25 +223,25 @@ def _bad(path: Path, line: int, column: str, value: float, allowed: str) -> Airf
 def _split_blocks(path: Path, values: Array, lines: list[int]) -> list[slice]:
     """Rows of each Reynolds number; every block must repeat the angles of the first."""
     reynolds = values[:, 0]
-    for i in np.flatnonzero(np.diff(reynolds) < 0) + 1:
-        raise _bad(path, lines[i], "reynolds", reynolds[i], f"at least {reynolds[i - 1]:.10g}, the one above")
+    for row in np.flatnonzero(np.diff(reynolds) < 0) + 1:
+        allowed = f"at least {reynolds[row - 1]:.10g}, the one above"
+        raise _bad(path, lines[row], "reynolds", reynolds[row], allowed)
     starts = [0, *(np.flatnonzero(np.diff(reynolds)) + 1)]
     blocks = [slice(*ends) for ends in zip(starts, [*starts[1:], len(values)], strict=True)]
     if len(blocks) < 2:
         raise _bad(path, lines[0], "reynolds", reynolds[0], "one of at least 2 different values in the table")
-    first = values[blocks[0], 1]
-    for block in blocks:
-        angles = values[block, 1]
-        for i in range(min(len(angles), len(first))):
-            if angles[i] != first[i]:
-                allowed = f"{first[i]:.10g} as for the first Reynolds number"
-                raise _bad(path, lines[block.start + i], "alpha_deg", angles[i], allowed)
-        if len(angles) != len(first):
-            allowed = (
-                f"the last of {len(first)} angles as for the first Reynolds number, not of {len(angles)}"
-            )
-            raise _bad(path, lines[block.stop - 1], "alpha_deg", angles[-1], allowed)
+    for block in blocks[1:]:
+        _check_same_angles(path, values[blocks[0], 1], values[block, 1], lines[block])
     return blocks
+
+
+def _check_same_angles(path: Path, first: Array, angles: Array, lines: list[int]) -> None:
+    for expected, angle, line in zip(first, angles, lines, strict=False):
+        if angle != expected:
+            raise _bad(path, line, "alpha_deg", angle, f"{expected:.10g} as for the first Reynolds number")
+    if len(angles) != len(first):
+        allowed = f"the last of {len(first)} angles as for the first Reynolds number, not of {len(angles)}"
+        raise _bad(path, lines[-1], "alpha_deg", angles[-1], allowed)
 
 
 def _check_angles(path: Path, values: Array, lines: list[int], blocks: list[slice]) -> int:
@@ -254,13 +255,8 @@ def _check_angles(path: Path, values: Array, lines: list[int], blocks: list[slic
     half = round(float(180 / step))
     place = angles / 180 * half
     for i in np.flatnonzero(np.abs(place - np.rint(place)) > STEP_TOLERANCE):
-        raise _bad(
-            path,
-            lines[i],
-            "alpha_deg",
-            angles[i],
-            f"a multiple of a step that divides 180, not of {step:.10g}",
-        )
+        allowed = f"a multiple of a step that divides 180, not of {step:.10g}"
+        raise _bad(path, lines[i], "alpha_deg", angles[i], allowed)
     return half
 
 
@@ -316,7 +312,7 @@ def write_table(path: str | Path, table: AirfoilTable, comments: Sequence[str] =
 
 
 def cells(table: AirfoilTable) -> Array:
-    """Coefficients of the bilinear interpolation in every cell of a table, for `lookup`.
+    """Coefficients of the bilinear interpolation in every cell of a table, for `coefficients_at`.
 
     Within a cell, with x and y in 0..1 the fractions along angle and Reynolds number,
     cl = c0 + c1 x + c2 y + c3 x y and cd = c4 + c5 x + c6 y + c7 x y.
@@ -361,11 +357,8 @@ def cell_grid(table: AirfoilTable) -> tuple[int, float, float]:
 
 
 @kernel
-def lookup(cells, first_row, n_alpha, alpha0, inverse_step, knots, n_re, reynolds, alpha):
-    """Lift and drag coefficient at one Reynolds number and angle, bilinear.
-
-    Outside the table the nearest value is taken, so that no finite or infinite input reads outside `cells`.
-    NaN reads inside as well and gives NaN.
+def coefficients_at(cells, first_row, n_alpha, n_re, re_place, alpha_place):
+    """Lift and drag coefficient at a place in a table, bilinear.
 
     Parameters
     ----------
@@ -373,27 +366,21 @@ def lookup(cells, first_row, n_alpha, alpha0, inverse_step, knots, n_re, reynold
         `cells` of one or more tables, one after the other.
     first_row : int
         First row of the table.
-    n_alpha, alpha0, inverse_step : int, float, float
-        `cell_grid` of the table; angles in rad.
-    knots : ndarray, shape (at least n_re,)
-        Reynolds numbers of the table.
-    n_re : int
-        Number of Reynolds numbers.
-    reynolds, alpha : float
-        Reynolds number and angle of attack [rad].
+    n_alpha, n_re : int
+        Cells along the angle (`cell_grid`), Reynolds numbers of the table.
+    re_place, alpha_place : float
+        Distance from the first knot in cells, 0 to n_re - 1 and 0 to n_alpha: see `clamp`. NaN reads inside as well
+        and gives NaN.
 
     Returns
     -------
     cl, cd : float
     """
-    i = 0
-    while i < n_re - 2 and reynolds >= knots[i + 1]:
-        i += 1
-    y = _clamp((reynolds - knots[i]) / (knots[i + 1] - knots[i]), 1.0)
-    place = (alpha - alpha0) * inverse_step
     # A comparison with NaN is false: the cell is then the last one, and the fractions stay NaN.
-    j = int(place if place > 0.0 else 0.0) if place < n_alpha else n_alpha - 1
-    x = _clamp(place - j, 1.0)
+    i = int(re_place) if re_place < n_re - 1 else n_re - 2
+    j = int(alpha_place) if alpha_place < n_alpha else n_alpha - 1
+    y = re_place - i
+    x = alpha_place - j
     row = first_row + i * n_alpha + j
     cl = cells[row, 0] + cells[row, 1] * x + (cells[row, 2] + cells[row, 3] * x) * y
     cd = cells[row, 4] + cells[row, 5] * x + (cells[row, 6] + cells[row, 7] * x) * y
@@ -401,8 +388,12 @@ def lookup(cells, first_row, n_alpha, alpha0, inverse_step, knots, n_re, reynold
 
 
 @kernel
-def _clamp(value, upper):
-    """Limit a number to 0..upper; NaN stays NaN."""
+def clamp(value, upper):
+    """Limit a number to 0..upper; NaN stays NaN.
+
+    The place of an angle is clamp((alpha - alpha0) * inverse_step, n_alpha). The place of a Reynolds number is the sum
+    over the cells of clamp((reynolds - lower knot) / width, 1): every cell below counts whole, every one above not.
+    """
     value = 0.0 if value < 0.0 else value
     return upper if value > upper else value
 

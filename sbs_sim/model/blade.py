@@ -9,36 +9,85 @@ is the one of a counter-clockwise rotor, and mirrored aircraft are mirrored exac
 import math
 
 from sbs_sim.model import params as P
-from sbs_sim.model.airfoil import lookup
+from sbs_sim.model.airfoil import clamp, coefficients_at
+from sbs_sim.model.arctangent import arctangent2
 from sbs_sim.model.kernel import kernel
+
+CHUNK = P.CHUNK
+SPEED_ROW, REYNOLDS_ROW, ALPHA_ROW, RE_ROW, LIFT_ROW, DRAG_ROW = (CHUNK * row for row in range(P.STRIP_ROWS))
 
 
 @kernel
-def section_loads(p, j, ut0, ut1, up0, up1, pitch):
+def section_loads(p, j, strip, ut0, ut1, up0, up1, pitch):
     """Sums of the aerodynamic forces along one blade of rotor j (MODEL.md section 4).
 
     The velocities relative to the air are linear in the distance s from the flap hinge: u_T = ut0 + ut1 s along the
     motion, u_P = up0 + up1 s along the blade's normal n [m/s]. pitch: angle of the blade root [rad].
 
+    The elements go by in chunks, each in three passes over the rows of `strip`: arithmetic that the compiler turns
+    into vector instructions, look-ups that it cannot, and arithmetic again.
+
     Returns
     -------
     Int dF_n, Int dF_t [N], Int s dF_n, Int s dF_t [N m], n up and t forward.
     """
-    first_row, n_alpha, n_re = p.grid_index[j, 0], p.grid_index[j, 1], p.grid_index[j, 2]
-    alpha0, inverse_step = p.grid[j, 0], p.grid[j, 1]
-    knots = p.grid[j, 2:]
-    density, inverse_viscosity = p.air[P.DENSITY], p.air[P.INVERSE_VISCOSITY]
     fn = ft = mn = mt = 0.0
-    for i in range(p.element.shape[2]):
-        s = p.element[j, P.SPAN, i]
+    for start in range(0, p.element.shape[2], CHUNK):
+        count = min(CHUNK, p.element.shape[2] - start)
+        _section_flow(p, j, strip, start, count, ut0, ut1, up0, up1, pitch)
+        _section_coefficients(p, j, strip, count)
+        dfn, dft, dmn, dmt = _section_forces(p, j, strip, start, count, ut0, ut1, up0, up1)
+        fn += dfn
+        ft += dft
+        mn += dmn
+        mt += dmt
+    return fn, ft, mn, mt
+
+
+@kernel
+def _section_flow(p, j, strip, start, count, ut0, ut1, up0, up1, pitch):
+    """Speed, and place in the airfoil table, of every element of a chunk; places are in cells."""
+    inverse_viscosity = p.air[P.INVERSE_VISCOSITY]
+    n_alpha, n_re = p.grid_index[j, 1], p.grid_index[j, 2]
+    alpha0, inverse_step = p.grid[j, 0], p.grid[j, 1]
+    for i in range(count):
+        s = p.element[j, P.SPAN, start + i]
         ut = ut0 + ut1 * s
         up = up0 + up1 * s
         speed = math.sqrt(ut * ut + up * up)
-        alpha = pitch + p.element[j, P.TWIST, i] - math.atan2(up, ut)
-        reynolds = speed * p.element[j, P.CHORD, i] * inverse_viscosity
-        cl, cd = lookup(p.cells, first_row, n_alpha, alpha0, inverse_step, knots, n_re, reynolds, alpha)
-        cl *= p.element[j, P.LIFT_FRACTION, i]
-        scale = density * p.element[j, P.HALF_AREA, i] * speed
+        alpha = pitch + p.element[j, P.TWIST, start + i] - arctangent2(up, ut)
+        strip[SPEED_ROW + i] = speed
+        strip[REYNOLDS_ROW + i] = speed * p.element[j, P.CHORD, start + i] * inverse_viscosity
+        strip[ALPHA_ROW + i] = clamp((alpha - alpha0) * inverse_step, 1.0 * n_alpha)
+        strip[RE_ROW + i] = 0.0
+    for k in range(n_re - 1):
+        knot, inverse_width = p.grid[j, 2 + k], 1.0 / (p.grid[j, 3 + k] - p.grid[j, 2 + k])
+        for i in range(count):
+            strip[RE_ROW + i] += clamp((strip[REYNOLDS_ROW + i] - knot) * inverse_width, 1.0)
+
+
+@kernel
+def _section_coefficients(p, j, strip, count):
+    """Lift and drag coefficient of every element of a chunk."""
+    first_row, n_alpha, n_re = p.grid_index[j, 0], p.grid_index[j, 1], p.grid_index[j, 2]
+    for i in range(count):
+        cl, cd = coefficients_at(p.cells, first_row, n_alpha, n_re, strip[RE_ROW + i], strip[ALPHA_ROW + i])
+        strip[LIFT_ROW + i] = cl
+        strip[DRAG_ROW + i] = cd
+
+
+@kernel
+def _section_forces(p, j, strip, start, count, ut0, ut1, up0, up1):
+    """Sums of a chunk: forces and first moments about the flap hinge."""
+    density = p.air[P.DENSITY]
+    fn = ft = mn = mt = 0.0
+    for i in range(count):
+        s = p.element[j, P.SPAN, start + i]
+        ut = ut0 + ut1 * s
+        up = up0 + up1 * s
+        cl = strip[LIFT_ROW + i] * p.element[j, P.LIFT_FRACTION, start + i]
+        cd = strip[DRAG_ROW + i]
+        scale = density * p.element[j, P.HALF_AREA, start + i] * strip[SPEED_ROW + i]
         dn = scale * (cl * ut - cd * up)
         dt = -scale * (cl * up + cd * ut)
         fn += dn
@@ -49,7 +98,7 @@ def section_loads(p, j, ut0, ut1, up0, up1, pitch):
 
 
 @kernel
-def blade_terms(p, j, row, beta, beta_rate, xi, xi_rate, cosine, sine, pitch, inflow0, inflow1, flow, rates, base, hang):
+def blade_terms(p, j, row, strip, beta, beta_rate, xi, xi_rate, cosine, sine, pitch, inflow0, inflow1, flow, rates, base, hang):
     """Fill the work row of one blade of rotor j: hinge moments, couplings and loads without accelerations.
 
     Parameters
@@ -57,6 +106,8 @@ def blade_terms(p, j, row, beta, beta_rate, xi, xi_rate, cosine, sine, pitch, in
     p : Params
     row : ndarray, shape (BLADE_SIZE,)
         Output, in body axes, six-vectors (force, moment) about the c.g.
+    strip : ndarray
+        `Work.strip`.
     beta, beta_rate, xi, xi_rate : float
         Flap and lag angles [rad] and rates [rad/s] of this blade.
     cosine, sine : float
@@ -98,6 +149,7 @@ def blade_terms(p, j, row, beta, beta_rate, xi, xi_rate, cosine, sine, pitch, in
     fn, ft, mn, mt = section_loads(
         p,
         j,
+        strip,
         vf2,
         wl3 * cb - o1 * sb,
         cb * vf3 - sb * vf1 + cb * (inflow0 + rotor[P.HINGE] * inflow1),

@@ -26,11 +26,11 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk."""
-    with _cache_in(_cache_folder()):
+    with _cache_in(cache_folder()):
         return numba.njit(nogil=True, error_model="numpy", fastmath=FASTMATH, cache=True)(function)
 
 
-def _cache_folder() -> Path:
+def cache_folder() -> Path:
     """Where the machine code of these very sources is kept.
 
     numba asks only whether the file of the function itself has changed, not the files of what it calls.
@@ -41,7 +41,7 @@ def _cache_folder() -> Path:
     digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:16]
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
-        return Path(chosen) / f"sbs_sim-{digest}"
+        return Path(chosen) / "sbs_sim" / f"kernels-{digest}"
     beside = here / "__pycache__" / f"kernels-{digest}"
     if _writable(beside):
         return beside

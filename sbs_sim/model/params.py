@@ -54,6 +54,12 @@ ROTOR_SIZE = 21
 SPAN, CHORD, HALF_AREA, LIFT_FRACTION, TWIST = range(5)
 ELEMENT_ROWS = 5
 
+# Elements are worked on in chunks of this many; a vector register holds four or eight of them, and a blade is filled
+# up with elements without area to whole registers.
+CHUNK = 64
+REGISTER = 8
+STRIP_ROWS = 6
+
 # loads: columns of one rotor's outputs; forces and moments in body axes about the hub centre
 THRUST, TORQUE, FORCE, MOMENT = 0, 1, 2, 5
 LOAD_SIZE = 8
@@ -129,6 +135,8 @@ class Work(NamedTuple):
         Azimuths of a stage [rad].
     wind : ndarray, shape (3,)
         Wind of a stage, NED [m/s].
+    strip : ndarray, shape (STRIP_ROWS * CHUNK,)
+        Section values along one blade, row by row.
     """
 
     blade: Array
@@ -141,6 +149,7 @@ class Work(NamedTuple):
     stages: Array
     psi: Array
     wind: Array
+    strip: Array
 
 
 def make_work(params: Params) -> Work:
@@ -159,4 +168,5 @@ def make_work(params: Params) -> Work:
         stages=np.zeros((4, size)),
         psi=np.zeros(rotors),
         wind=np.zeros(3),
+        strip=np.zeros(STRIP_ROWS * CHUNK),
     )

@@ -1,0 +1,327 @@
+"""The simulation against the clock: a thread that flies tick after tick and hands out what happened.
+
+The thread spends its time in compiled code without the GIL or asleep. All that others want of the simulation (commands,
+reset, wind, pause, step) is put in a mailbox and carried out between two ticks, so a tick is never disturbed.
+"""
+
+import collections
+import queue
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sbs_sim.errors import SbsError, SimulationError
+from sbs_sim.model.wind import Wind
+from sbs_sim.simulation import Simulation, Snapshot
+
+QUEUE_LENGTH = 100  # snapshots between the flight and their reader: one second at 100 Hz
+HURRY_TICKS = 10  # the schedule is kept by hurrying up to this many ticks; beyond, real time is lost for good
+IDLE_PERIOD = 0.1  # s of wall time between reports while paused
+RATE_WINDOW = 1.0  # s of wall time over which the real-time factor is measured
+MOST_STEP_TICKS = 10_000
+
+
+@dataclass(frozen=True)
+class Report:
+    """State of the loop when it was handed out, with a snapshot if the aircraft has moved.
+
+    Attributes
+    ----------
+    snapshot : Snapshot or None
+    playing : bool
+    step : int
+        Integration steps since the start.
+    time : float
+        Simulation time [s].
+    real_time_factor : float
+        Simulation time over wall time, of the last second.
+    missed_deadlines : int
+        Ticks that were ready later than one tick after they were due.
+    dropped : int
+        Reports that no reader took in time.
+    fault : str
+        Why the simulation cannot go on; empty if it can.
+    command_timed_out : bool
+        The last command is older than the time-out and is being held.
+    """
+
+    snapshot: Snapshot | None
+    playing: bool
+    step: int
+    time: float
+    real_time_factor: float
+    missed_deadlines: int
+    dropped: int
+    fault: str
+    command_timed_out: bool
+
+
+class FlightLoop:
+    """Flies a `Simulation` in a thread of its own.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Used by the loop alone once it has started.
+    real_time_factor : float
+        Simulation time over wall time, 0 to 1000; 0 is as fast as reports are taken.
+    command_timeout : float
+        Age of a command [s of simulation time] beyond which it is reported as timed out; 0 is never.
+
+    Raises
+    ------
+    SimulationError
+        A value out of range.
+    """
+
+    def __init__(self, simulation: Simulation, real_time_factor: float = 1.0, command_timeout: float = 0.5) -> None:
+        self._simulation = simulation
+        self.set_pace(real_time_factor)
+        self.set_command_timeout(command_timeout)
+        self.reports: queue.Queue[Report | None] = queue.Queue(QUEUE_LENGTH)
+        self._mailbox: collections.deque[tuple[Callable[[], Any], Future[Any]]] = collections.deque()
+        self._wake = threading.Condition()
+        self._thread = threading.Thread(target=self._run, name="flight", daemon=True)
+        self._playing = True
+        self._stopping = False
+        self._fault = ""
+        self._missed = self._dropped = 0
+        self._command: np.ndarray | None = None
+        self._command_time: float | None = None
+        self._anchor = 0.0  # wall time at which the tick `_anchor_tick` was due
+        self._ticks_due = 0
+        self._marks: collections.deque[tuple[float, float]] = collections.deque()
+
+    # ------------------------------------------------------------------------------------------- from any thread
+
+    def start(self) -> None:
+        """Start to fly."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and wait for it; the last report is None."""
+        with self._wake:
+            self._stopping = True
+            self._wake.notify()
+        if self._thread.is_alive():
+            self._thread.join()
+        while True:
+            try:
+                self.reports.put_nowait(None)
+                return
+            except queue.Full:  # there is no reader any more: the end matters more than the oldest report
+                self.reports.get_nowait()
+
+    def set_pace(self, real_time_factor: float) -> None:
+        """Set the wanted real-time factor, 0 to 1000."""
+        if not 0.0 <= real_time_factor <= 1000.0:
+            raise SimulationError(f"real_time_factor = {real_time_factor}: allowed are 0 to 1000")
+        self._pace = real_time_factor
+        self._replan = True
+
+    def set_command_timeout(self, seconds: float) -> None:
+        """Set the age at which a command counts as timed out [s]; 0 is never."""
+        if not 0.0 <= seconds <= 1e6:
+            raise SimulationError(f"command_timeout = {seconds}: allowed are 0 to 1e+06 s")
+        self._timeout = seconds
+
+    def command(self, swashplate: ArrayLike) -> None:
+        """Set the swashplate angles of all rotors [rad], shape (n_rotors, 3), from the next tick on.
+
+        Raises
+        ------
+        SimulationError
+            See `Simulation.checked_swashplate`; what was commanded before stays in force.
+        """
+        self._command = self._simulation.checked_swashplate(swashplate)
+
+    def call(self, function: Callable[[], Any], timeout: float = 10.0) -> Any:
+        """Carry out a function in the flight's thread between two ticks and return its result.
+
+        Raises
+        ------
+        SimulationError
+            No answer in time, because the loop has ended.
+        Exception
+            Whatever the function raises.
+        """
+        answer: Future[Any] = Future()
+        with self._wake:
+            self._mailbox.append((function, answer))
+            self._wake.notify()
+        try:
+            return answer.result(timeout)
+        except TimeoutError:
+            raise SimulationError(f"the flight did not answer within {timeout:g} s") from None
+
+    def pause(self, pause: bool) -> None:
+        """Pause or go on; refused while a fault lasts."""
+        self.call(lambda: self._set_playing(not pause))
+
+    def step(self, ticks: int) -> float:
+        """Fly some ticks while paused and return the simulation time [s] after them."""
+        if not 1 <= ticks <= MOST_STEP_TICKS:
+            raise SimulationError(f"ticks = {ticks}: allowed are 1 to {MOST_STEP_TICKS}")
+        for _ in range(ticks):
+            time_after = self.call(self._single_tick)
+        return float(time_after)
+
+    def reset(self, state: ArrayLike, swashplate: ArrayLike) -> None:
+        """Put the aircraft into another state and clear a fault; time goes on."""
+        self.call(lambda: self._reset(state, swashplate))
+
+    def set_wind(self, make: Callable[[Snapshot], Wind]) -> None:
+        """Set the wind that `make` gives for the present instant, from the next tick on."""
+        self.call(lambda: self._set_wind(make))
+
+    def wind(self) -> Wind:
+        """The wind in force."""
+        return self._simulation.wind
+
+    def swashplate(self) -> np.ndarray:
+        """The swashplate angles in force [rad], shape (n_rotors, 3)."""
+        return self._simulation.swashplate
+
+    @property
+    def command_timeout(self) -> float:
+        """Age at which a command counts as timed out [s]; 0 is never."""
+        return self._timeout
+
+    # -------------------------------------------------------------------------------------- in the flight's thread
+
+    def _run(self) -> None:
+        self._report()
+        while not self._stopping:
+            self._empty_mailbox()
+            if not self._playing:
+                self._rest()
+            elif self._wait_until_due():
+                self._tick()
+
+    def _empty_mailbox(self) -> None:
+        while self._mailbox:
+            function, answer = self._mailbox.popleft()
+            try:
+                answer.set_result(function())
+            except Exception as error:
+                answer.set_exception(error)
+
+    def _rest(self) -> None:
+        """Wait for mail while paused, and show that the loop is alive."""
+        with self._wake:
+            if not self._mailbox and not self._stopping:
+                self._wake.wait(IDLE_PERIOD)
+        if not self._mailbox and not self._stopping:
+            self._marks.clear()
+            self._report(with_snapshot=False)
+
+    def _wait_until_due(self) -> bool:
+        """Sleep until the next tick is due; false if mail or the end came first."""
+        if self._pace == 0.0:
+            return True
+        now = time.monotonic()
+        period = self._simulation.tick / self._pace
+        if self._replan or now - self._anchor - self._ticks_due * period > HURRY_TICKS * period:
+            self._anchor, self._ticks_due, self._replan = now, 0, False
+        due = self._anchor + self._ticks_due * period
+        while (left := due - time.monotonic()) > 0:
+            with self._wake:
+                if self._mailbox or self._stopping:
+                    return False
+                self._wake.wait(left)
+        return True
+
+    def _tick(self) -> None:
+        """One tick, with its deadline looked after."""
+        self._fly()
+        if self._pace > 0.0:
+            period = self._simulation.tick / self._pace
+            self._ticks_due += 1
+            if time.monotonic() > self._anchor + self._ticks_due * period:
+                self._missed += 1
+        self._report(patient=self._pace == 0.0)
+
+    def _fly(self) -> None:
+        """Take the newest command and fly one tick; a fault pauses."""
+        simulation = self._simulation
+        command, self._command = self._command, None
+        if command is not None:
+            simulation.swashplate = command  # checked when it came
+            self._command_time = simulation.time
+        try:
+            simulation.advance()
+        except SbsError as error:
+            self._fault = str(error)
+            self._playing = False
+
+    def _single_tick(self) -> float:
+        if self._playing:
+            raise SimulationError("the simulation is playing: step is allowed while it is paused")
+        self._check_fault()
+        self._fly()
+        self._report(patient=True)
+        self._check_fault()
+        return self._simulation.time
+
+    def _set_playing(self, playing: bool) -> None:
+        if playing:
+            self._check_fault()
+            if not self._playing:
+                self._replan = True
+                self._marks.clear()
+        self._playing = playing
+        self._report(with_snapshot=False)
+
+    def _check_fault(self) -> None:
+        if self._fault:
+            raise SimulationError(f"the simulation has stopped, reset it first: {self._fault}")
+
+    def _set_wind(self, make: Callable[[Snapshot], Wind]) -> None:
+        self._simulation.set_wind(make(self._simulation.snapshot()))
+
+    def _reset(self, state: ArrayLike, swashplate: ArrayLike) -> None:
+        self._simulation.reset(state, swashplate)
+        self._fault = ""
+        self._command = self._command_time = None
+        self._report()
+
+    def _report(self, with_snapshot: bool = True, patient: bool = False) -> None:
+        """Hand out the present state; a patient report waits for its reader, another is dropped if there is none."""
+        simulation = self._simulation
+        age = 0.0 if self._command_time is None else simulation.time - self._command_time
+        report = Report(
+            snapshot=simulation.snapshot() if with_snapshot else None,
+            playing=self._playing,
+            step=simulation.step,
+            time=simulation.time,
+            real_time_factor=self._measure_pace(),
+            missed_deadlines=self._missed,
+            dropped=self._dropped,
+            fault=self._fault,
+            command_timed_out=self._timeout > 0.0 and age > self._timeout + 1e-9,
+        )
+        while True:
+            try:
+                self.reports.put(report, block=patient, timeout=0.1)
+                return
+            except queue.Full:
+                if not patient or self._stopping:
+                    self._dropped += 1
+                    return
+
+    def _measure_pace(self) -> float:
+        """Simulation time over wall time since the oldest mark of the last second."""
+        if not self._playing:
+            return 0.0
+        now = time.monotonic()
+        self._marks.append((now, self._simulation.time))
+        while now - self._marks[0][0] > RATE_WINDOW:
+            self._marks.popleft()
+        wall, flown = self._marks[0]
+        return (self._simulation.time - flown) / (now - wall) if now > wall else 0.0

@@ -1,0 +1,96 @@
+"""The control mixer: four pilot controls to the swashplates of all rotors, with ranges and rates.
+
+Swashplate angles are `Rotor.mixing` times the pilot controls (paper section 2.1.1; MODEL.md section 4). Pilot controls
+are clipped to their ranges, swashplate angles to theirs, and each angle moves no faster than its actuator.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.errors import SimulationError
+from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
+
+Array = NDArray[np.float64]
+
+
+class Mixer:
+    """Mixer of an aircraft with the memory that its rate limits need.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+
+    Attributes
+    ----------
+    saturated : tuple of str
+        Controls and swashplate angles that the last target has clipped, with their limit; rates are not among them.
+    """
+
+    def __init__(self, aircraft: Aircraft) -> None:
+        self._aircraft = aircraft
+        ranges = np.array([aircraft.control_ranges[name] for name in CONTROL_NAMES])
+        self._low, self._high = ranges.T
+        swash = np.array([[r.collective_range, r.cyclic_range, r.cyclic_range] for r in aircraft.rotors])
+        self._swash_low, self._swash_high = swash[:, :, 0], swash[:, :, 1]
+        self._rates = np.array([[rotor.swashplate_rate] for rotor in aircraft.rotors])
+        self._target: Array | None = None
+        self._angles: Array | None = None
+        self._time = 0.0
+        self.saturated: tuple[str, ...] = ()
+
+    def set_target(self, controls: ArrayLike) -> None:
+        """Set the pilot controls [rad], shape (4,).
+
+        Raises
+        ------
+        SimulationError
+            A control is not finite or beyond a right angle; the target before stays.
+        """
+        values = np.asarray(controls, dtype=float)
+        for name, value in zip(CONTROL_NAMES, values, strict=True):
+            if not abs(value) <= math.pi / 2:  # true for a NaN as well
+                raise SimulationError(f"{name} = {value}: allowed are -1.5708 to 1.5708 rad")
+        clipped = np.clip(values, self._low, self._high)
+        wanted = self._aircraft.mix(clipped)
+        self._target = np.clip(wanted, self._swash_low, self._swash_high)
+        texts = _clipped(CONTROL_NAMES, values, clipped)
+        for rotor, row, limited in zip(self._aircraft.rotors, wanted, self._target, strict=True):
+            texts += _clipped([f"{rotor.name} {name}" for name in SWASHPLATE_NAMES], row, limited)
+        self.saturated = tuple(texts)
+
+    def move(self, time: float) -> Array:
+        """Swashplate angles [rad], shape (n_rotors, 3), at a time [s].
+
+        They move towards the target at their actuators' rates. Where the swashplates stand before the first target is
+        not known, so they are at the first target at once.
+
+        Raises
+        ------
+        SimulationError
+            There is no target yet.
+        """
+        if self._target is None:
+            raise SimulationError("the mixer has no controls yet")
+        if self._angles is None:
+            self._angles = self._target.copy()
+        else:
+            reach = self._rates * max(0.0, time - self._time)
+            self._angles = self._angles + np.clip(self._target - self._angles, -reach, reach)
+        self._time = time
+        return self._angles.copy()
+
+    @property
+    def arrived(self) -> bool:
+        """True when the angles are those of the target."""
+        return self._target is None or np.array_equal(self._angles, self._target)
+
+
+def _clipped(names: tuple[str, ...] | list[str], wanted: Array, limited: Array) -> list[str]:
+    return [
+        f"{name} at its limit of {math.degrees(limit):.6g} deg"
+        for name, value, limit in zip(names, wanted, limited, strict=True)
+        if abs(value - limit) > 1e-12
+    ]

@@ -1,0 +1,183 @@
+"""Arrays to messages and back.
+
+Inside, positions are NED and vectors FRD; `odom` alone is in the axes of REP 103 (ENU, FLU). Which is which stands in
+the frame_id of every message.
+"""
+
+import array
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point, Quaternion, Vector3
+from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
+
+from sbs_msgs.msg import BodyState, Controls, Inflow, InflowArray, RotorState, RotorStateArray, SwashplateArray
+from sbs_msgs.srv import SetWind
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.model import params as P
+from sbs_sim.model import state as S
+from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
+from sbs_sim.model.wind import Wind
+from sbs_sim.simulation import Snapshot, blade_angles
+
+Array = NDArray[np.float64]
+
+FRAME_NED = "ned"
+FRAME_BODY = "base_link_frd"
+FRAME_ODOM = "odom"
+FRAME_BASE = "base_link"
+HALF = math.sqrt(0.5)
+DEFAULT_TURBULENCE_LENGTH = 50.0  # m
+LEAST_TURBULENCE_AIRSPEED = 1.0  # m/s
+
+
+def to_time(seconds: float) -> Time:
+    """ROS time of a simulation time [s]."""
+    nanoseconds = round(seconds * 1e9)
+    return Time(sec=nanoseconds // 1_000_000_000, nanosec=nanoseconds % 1_000_000_000)
+
+
+def controls_array(message: Controls) -> Array:
+    """Pilot controls [rad], shape (4,)."""
+    return np.array([getattr(message, name) for name in S.CONTROL_NAMES])
+
+
+def swashplate_array(message: SwashplateArray) -> Array:
+    """Swashplate angles [rad], shape (n_rotors, 3)."""
+    angles = [[getattr(rotor, name) for name in S.SWASHPLATE_NAMES] for rotor in message.rotors]
+    return np.array(angles, dtype=float).reshape(-1, len(S.SWASHPLATE_NAMES))
+
+
+def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
+    """Wind of a request; what it leaves to the flight comes from the present one.
+
+    Raises
+    ------
+    SimulationError
+        See `Wind`.
+    """
+    velocity = _triple(request.velocity)
+    relative = _ground_velocity(snapshot) - np.array(velocity)
+    speed = float(np.hypot(relative[0], relative[1]))
+    heading = quaternion_to_euler(snapshot.state[S.ATTITUDE : S.VELOCITY])[0]
+    moving = speed >= LEAST_TURBULENCE_AIRSPEED
+    return Wind(
+        velocity=velocity,
+        gust=_triple(request.gust),
+        gust_delay=request.gust_delay,
+        gust_duration=request.gust_duration,
+        turbulence_intensity=_triple(request.turbulence_intensity),
+        turbulence_length=request.turbulence_length or DEFAULT_TURBULENCE_LENGTH,
+        turbulence_airspeed=request.turbulence_airspeed or max(speed, LEAST_TURBULENCE_AIRSPEED),
+        turbulence_direction=math.atan2(relative[1], relative[0]) if moving else heading,
+        turbulence_seed=request.turbulence_seed,
+    )
+
+
+def _triple(vector: Vector3 | Point) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
+
+
+def point_array(point: Point) -> Array:
+    """Components of a point, shape (3,)."""
+    return np.array(_triple(point))
+
+
+def _ground_velocity(snapshot: Snapshot) -> Array:
+    """Velocity over ground, NED [m/s], shape (3,)."""
+    return rotation_matrix(snapshot.state[S.ATTITUDE : S.VELOCITY]) @ snapshot.state[S.VELOCITY : S.RATES]
+
+
+def _set_vector(target: Vector3 | Point, values: Sequence[float]) -> None:
+    target.x, target.y, target.z = values
+
+
+def _doubles(values: Array) -> array.array:
+    """Array for a float64[] field: this type alone is taken without a look at every element."""
+    return array.array("d", values.tobytes())
+
+
+class StateMessages:
+    """The messages of one instant; made once and filled again and again.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    """
+
+    def __init__(self, aircraft: Aircraft) -> None:
+        self._aircraft = aircraft
+        self._layout = aircraft.layout
+        count = len(aircraft.rotors)
+        self.state = BodyState()
+        self.state.header.frame_id = FRAME_NED
+        self.rotors = RotorStateArray(rotors=[RotorState(speed=rotor.speed) for rotor in aircraft.rotors])
+        self.rotors.header.frame_id = FRAME_BODY
+        self.inflow = InflowArray(rotors=[Inflow() for _ in range(count)])
+        self.inflow.header.frame_id = FRAME_BODY
+        self.odom = Odometry(child_frame_id=FRAME_BASE)
+        self.odom.header.frame_id = FRAME_ODOM
+
+    def fill(self, snapshot: Snapshot) -> None:
+        """Fill all messages from a snapshot."""
+        stamp = to_time(snapshot.time)
+        for message in (self.state, self.rotors, self.inflow, self.odom):
+            message.header.stamp = stamp
+        values = snapshot.state.tolist()
+        self._fill_state(values, snapshot.acceleration.tolist())
+        self._fill_odom(values)
+        angles = blade_angles(self._aircraft, snapshot)
+        loads = snapshot.loads.tolist()
+        azimuth = snapshot.azimuth.tolist()
+        for j, rotor in enumerate(self.rotors.rotors):
+            rotor.azimuth = azimuth[j]
+            self._fill_rotor(rotor, j, snapshot.state, loads[j])
+            rotor.blade_flap, rotor.blade_lag = _doubles(angles[j][0]), _doubles(angles[j][1])
+            inflow = self.inflow.rotors[j]
+            inflow.uniform, inflow.sine, inflow.cosine = values[self._layout.inflow(j)]
+
+    def _fill_state(self, values: list[float], acceleration: list[float]) -> None:
+        body = self.state
+        _set_vector(body.position, values[0:3])
+        body.attitude.w, body.attitude.x, body.attitude.y, body.attitude.z = values[3:7]
+        _set_vector(body.velocity, values[7:10])
+        _set_vector(body.angular_velocity, values[10:13])
+        _set_vector(body.acceleration, acceleration)
+
+    def _fill_rotor(self, rotor: RotorState, j: int, state: Array, loads: list[float]) -> None:
+        layout = self._layout
+        rotor.flap = _doubles(state[layout.flap(j)])
+        rotor.flap_rate = _doubles(state[layout.flap_rate(j)])
+        rotor.lag = _doubles(state[layout.lag(j)])
+        rotor.lag_rate = _doubles(state[layout.lag_rate(j)])
+        rotor.thrust, rotor.torque = loads[P.THRUST], loads[P.TORQUE]
+        rotor.power = loads[P.TORQUE] * rotor.speed
+        _set_vector(rotor.hub.force, loads[P.FORCE : P.FORCE + 3])
+        _set_vector(rotor.hub.torque, loads[P.MOMENT : P.MOMENT + 3])
+
+    def _fill_odom(self, values: list[float]) -> None:
+        """The same motion in ENU and FLU: x east, y north, z up; body x forward, y left, z up."""
+        north, east, down = values[0:3]
+        pose, twist = self.odom.pose.pose, self.odom.twist.twist
+        _set_vector(pose.position, (east, north, -down))
+        _set_quaternion(pose.orientation, enu_flu_quaternion(values[3:7]))
+        u, v, w, p, q, r = values[7:13]
+        _set_vector(twist.linear, (u, -v, -w))
+        _set_vector(twist.angular, (p, -q, -r))
+
+
+def enu_flu_quaternion(ned_frd: Sequence[float]) -> tuple[float, float, float, float]:
+    """Quaternion (w, x, y, z) from FLU to ENU of one from FRD to NED.
+
+    q_ENU<-NED q q_FRD<-FLU with the half turns (0, 1, 1, 0) / sqrt(2) about the bisector of north and east and
+    (0, 1, 0, 0) about the body's x axis (REP 103), multiplied out.
+    """
+    w, x, y, z = ned_frd
+    return HALF * (w + z), HALF * (x + y), HALF * (x - y), HALF * (w - z)
+
+
+def _set_quaternion(target: Quaternion, values: Sequence[float]) -> None:
+    target.w, target.x, target.y, target.z = values

@@ -1,0 +1,270 @@
+"""Node `simulator`: flies an aircraft in real time.
+
+Publishes `state`, `rotors`, `inflow`, `odom`, `/clock`, `status`, `diagnostics`; subscribes `swashplate`; serves `pause`,
+`step`, `reset`, `set_wind`. The executable brings up the control mixer in the same process.
+"""
+
+import math
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import SetBool
+
+from sbs_msgs.msg import BodyState, InflowArray, RotorStateArray, SimulationStatus, SwashplateArray
+from sbs_msgs.srv import Reset, SetWind, Step
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.trim import TrimPoint, trim
+from sbs_sim.errors import SbsError, TrimError
+from sbs_sim.flight_loop import FlightLoop, Report
+from sbs_sim.model.state import CONTROL_NAMES
+from sbs_sim.model.wind import Wind
+from sbs_sim.nodes.control_mixer import ControlMixer
+from sbs_sim.nodes.conversions import StateMessages, point_array, swashplate_array, to_time, wind_of
+from sbs_sim.nodes.host import COMMAND_QOS, STATE_QOS, Parameter, declare, diagnostic, run
+from sbs_sim.simulation import Simulation, trimmed_state
+
+COMPONENTS = ("simulator", "control_mixer")
+PARAMETERS = {
+    "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
+    "components": Parameter(list(COMPONENTS), "Nodes to bring up in this process: simulator, control_mixer"),
+    "airspeed": Parameter(0.0, "Start: horizontal velocity relative to the air [m/s]", -100.0, 100.0),
+    "climb_rate": Parameter(0.0, "Start: vertical velocity relative to the air, up positive [m/s]", -50.0, 50.0),
+    "sideslip": Parameter(0.0, "Start: angle from heading to track, right positive [rad]", -math.pi, math.pi),
+    "turn_rate": Parameter(0.0, "Start: rate of the heading, right positive [rad/s]", -3.0, 3.0),
+    "heading": Parameter(0.0, "Start: heading, from north to east [rad]", -math.pi, math.pi),
+    "altitude": Parameter(0.0, "Start: height above the origin [m]", -1e5, 1e5),
+    "real_time_factor": Parameter(
+        1.0, "Simulation time over wall time; 0 is as fast as possible", 0.0, 1000.0, fixed=False
+    ),
+    "publish_rate": Parameter(100.0, "Ticks, and messages on every state topic, per simulated second [Hz]", 1.0, 1e4),
+    "azimuth_step_deg": Parameter(5.0, "Largest step of the fastest rotor's azimuth [deg]", 0.01, 45.0),
+    "lead_lag": Parameter(True, "Blades lead and lag"),
+    "cyclic_inflow": Parameter(True, "Inflow has its sine and cosine parts"),
+    "command_timeout": Parameter(
+        0.5, "Age of a command beyond which a warning is given [s of simulation time]; 0 is never", 0.0, 1e6, fixed=False
+    ),
+    "wind": Parameter([0.0, 0.0, 0.0], "Steady wind: north, east, down, where the air goes to [m/s]"),
+}
+COMPLAINT_PERIOD = 1.0  # s between complaints about bad input
+HEALTH_PERIOD = 1.0  # s of wall time between diagnostics
+
+
+class Simulator(Node):
+    """See the module."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("simulator", **options)
+        values = declare(self, PARAMETERS)
+        self.components = checked_components(values["components"])
+        self._aircraft = Aircraft.load(values["aircraft"])
+        self._fidelity = {"lead_lag": values["lead_lag"], "cyclic_inflow": values["cyclic_inflow"]}
+        self._loop = FlightLoop(self._start(values), values["real_time_factor"], values["command_timeout"])
+        self._messages = StateMessages(self._aircraft)
+        self._clock_message, self._status = Clock(), SimulationStatus()
+        self._rejected, self._last_problem = 0, ""
+        self._last_report: Report | None = None
+        self._make_interfaces()
+        self.add_on_set_parameters_callback(self._on_parameters)
+        self._publisher = threading.Thread(target=self._publish_all, name="publisher", daemon=True)
+        self._publisher.start()
+        self._loop.start()
+
+    def _start(self, values: dict[str, Any]) -> Simulation:
+        """Simulation in trimmed flight at the condition that the parameters name."""
+        if len(values["wind"]) != 3:
+            raise SbsError(f"parameter wind = {list(values['wind'])}: allowed are 3 numbers, north, east, down [m/s]")
+        wind = Wind(velocity=tuple(values["wind"]))
+        point = self._trim(*(values[name] for name in ("airspeed", "climb_rate", "sideslip", "turn_rate")))
+        angles = ", ".join(
+            f"{name} {math.degrees(value):.3f}" for name, value in zip(CONTROL_NAMES, point.controls, strict=True)
+        )
+        self.get_logger().info(f"{self._aircraft.name} trimmed with [deg] {angles}")
+        position = (0.0, 0.0, -values["altitude"])
+        return Simulation(
+            self._aircraft,
+            trimmed_state(self._aircraft, point, position, values["heading"], wind.velocity),
+            point.swashplate,
+            tick=1.0 / values["publish_rate"],
+            azimuth_step=math.radians(values["azimuth_step_deg"]),
+            wind=wind,
+            **self._fidelity,
+        )
+
+    def _trim(self, airspeed: float, climb_rate: float, sideslip: float, turn_rate: float) -> TrimPoint:
+        """Trim that can be flown: every control within its limits."""
+        point = trim(self._aircraft, airspeed, climb_rate, sideslip, turn_rate, **self._fidelity)
+        if point.beyond_limits:
+            raise TrimError("this flight needs " + "; ".join(point.beyond_limits))
+        return point
+
+    def _make_interfaces(self) -> None:
+        self._state = self.create_publisher(BodyState, "state", STATE_QOS)
+        self._rotors = self.create_publisher(RotorStateArray, "rotors", STATE_QOS)
+        self._inflow = self.create_publisher(InflowArray, "inflow", STATE_QOS)
+        self._odom = self.create_publisher(Odometry, "odom", STATE_QOS)
+        self._clock_topic = self.create_publisher(Clock, "/clock", STATE_QOS)
+        self._status_topic = self.create_publisher(SimulationStatus, "status", STATE_QOS)
+        self._health = self.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
+        self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
+        # a reset may trim for a while: commands must come through meanwhile
+        services = MutuallyExclusiveCallbackGroup()
+        self.create_service(SetBool, "pause", self._on_pause, callback_group=services)
+        self.create_service(Step, "step", self._on_step, callback_group=services)
+        self.create_service(Reset, "reset", self._on_reset, callback_group=services)
+        self.create_service(SetWind, "set_wind", self._on_set_wind, callback_group=services)
+        self.create_timer(HEALTH_PERIOD, self._publish_health)
+
+    # ----------------------------------------------------------------------------------------------------- inputs
+
+    def _on_swashplate(self, message: SwashplateArray) -> None:
+        try:
+            self._loop.command(swashplate_array(message))
+        except SbsError as error:
+            self._rejected += 1
+            self._last_problem = str(error)
+            self.get_logger().warning(f"swashplate rejected: {error}", throttle_duration_sec=COMPLAINT_PERIOD)
+
+    def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        return _answer(response, lambda: self._loop.pause(request.data), "paused" if request.data else "playing")
+
+    def _on_step(self, request: Step.Request, response: Step.Response) -> Step.Response:
+        def step() -> None:
+            response.sim_time = self._loop.step(request.ticks)
+
+        return _answer(response, step, f"{request.ticks} ticks")
+
+    def _on_reset(self, request: Reset.Request, response: Reset.Response) -> Reset.Response:
+        def reset() -> None:
+            if request.from_state:
+                self._loop.reset(request.state, self._loop.swashplate())
+                return
+            point = self._trim(request.airspeed, request.climb_rate, request.sideslip, request.turn_rate)
+            wind = self._loop.wind().velocity
+            position = point_array(request.position)
+            state = trimmed_state(self._aircraft, point, position, request.heading, wind)
+            self._loop.reset(state, point.swashplate)
+
+        return _answer(response, reset, "reset")
+
+    def _on_set_wind(self, request: SetWind.Request, response: SetWind.Response) -> SetWind.Response:
+        return _answer(response, lambda: self._loop.set_wind(lambda now: wind_of(request, now)), "wind set")
+
+    def _on_parameters(self, parameters: list[Any]) -> SetParametersResult:
+        try:
+            for parameter in parameters:
+                if parameter.name == "real_time_factor":
+                    self._loop.set_pace(parameter.value)
+                elif parameter.name == "command_timeout":
+                    self._loop.set_command_timeout(parameter.value)
+        except SbsError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    # ---------------------------------------------------------------------------------------------------- outputs
+
+    def _publish_all(self) -> None:
+        """Publish every report until the last; a thread of its own, so that the flight never waits."""
+        while (report := self._loop.reports.get()) is not None:
+            self._say_changes(report)
+            self._last_report = report
+            stamp = to_time(report.time)
+            self._clock_message.clock = stamp
+            self._clock_topic.publish(self._clock_message)
+            if report.snapshot is not None:
+                self._messages.fill(report.snapshot)
+                self._state.publish(self._messages.state)
+                self._rotors.publish(self._messages.rotors)
+                self._inflow.publish(self._messages.inflow)
+                self._odom.publish(self._messages.odom)
+            self._publish_status(report, stamp)
+
+    def _publish_status(self, report: Report, stamp: Any) -> None:
+        status = self._status
+        status.header.stamp = stamp
+        status.state = SimulationStatus.PLAYING if report.playing else SimulationStatus.PAUSED
+        status.sim_time = report.time
+        status.real_time_factor = report.real_time_factor
+        status.missed_deadlines = report.missed_deadlines
+        status.steps = report.step
+        status.dropped_messages = report.dropped
+        status.fault = report.fault
+        self._status_topic.publish(status)
+
+    def _say_changes(self, report: Report) -> None:
+        """One log line when a fault or a time-out begins."""
+        before = self._last_report
+        if report.fault and (before is None or report.fault != before.fault):
+            self.get_logger().error(f"paused: {report.fault}")
+        if report.command_timed_out and (before is None or not before.command_timed_out):
+            self.get_logger().warning(f"no command for {self._loop.command_timeout:g} s: holding the last one")
+
+    def _publish_health(self) -> None:
+        report = self._last_report
+        if report is None:
+            return
+        problems = []
+        if report.fault:
+            problems.append((DiagnosticStatus.ERROR, report.fault))
+        if report.command_timed_out:
+            problems.append((DiagnosticStatus.WARN, "command timed out, holding the last one"))
+        if report.dropped:
+            problems.append((DiagnosticStatus.WARN, f"{report.dropped} reports dropped"))
+        values = {
+            "sim_time": f"{report.time:.3f}",
+            "real_time_factor": f"{report.real_time_factor:.4f}",
+            "missed_deadlines": report.missed_deadlines,
+            "rejected_messages": self._rejected,
+            "last_rejection": self._last_problem or "none",
+        }
+        message = DiagnosticArray(status=[diagnostic("simulator", problems, values)])
+        message.header.stamp = to_time(report.time)
+        self._health.publish(message)
+
+    def destroy_node(self) -> None:
+        """End the flight and the publishing, then the node."""
+        self._loop.stop()
+        self._publisher.join()
+        super().destroy_node()
+
+
+def _answer(response: Any, act: Callable[[], Any], done: str) -> Any:
+    """Carry out a request and say how it went; an error changes nothing and is told."""
+    try:
+        act()
+    except SbsError as error:
+        response.success, response.message = False, str(error)
+    else:
+        response.success, response.message = True, done
+    return response
+
+
+def checked_components(names: list[str]) -> tuple[str, ...]:
+    """Names of components, if all are known.
+
+    Raises
+    ------
+    SbsError
+        Naming the one that is not.
+    """
+    unknown = [name for name in names if name not in COMPONENTS]
+    if unknown or not names:
+        raise SbsError(f"parameter components = {list(names)}: allowed are {', '.join(COMPONENTS)}")
+    return tuple(names)
+
+
+def _nodes() -> list[Node]:
+    simulator = Simulator()
+    return [simulator, ControlMixer()] if "control_mixer" in simulator.components else [simulator]
+
+
+def main(args: list[str] | None = None) -> None:
+    """Entry point of the executable `simulator`."""
+    sys.exit(run(_nodes, args))

@@ -1,0 +1,412 @@
+"""Flight in time: a stateful `Simulation` that advances tick by tick, and `simulate` for whole flights.
+
+A tick is the period at which states are handed out and commands taken in; it holds a whole number of integration
+steps. Steps are counted in integers from the start, and time is step x dt, so that the same commands at the same steps
+give the same flight to the last bit.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim.errors import SimulationError
+from sbs_sim.model import params as P
+from sbs_sim.model import state as S
+from sbs_sim.model.dynamics import derivative
+from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
+from sbs_sim.model.integrate import PARTITIONED, RK4, advance
+from sbs_sim.model.multiblade import blade_matrix
+from sbs_sim.model.wind import Wind, WindField, wind_at
+
+Array = NDArray[np.float64]
+
+METHODS = {"rk4": RK4, "partitioned": PARTITIONED}
+
+# Beyond these magnitudes a state is not plausible and the simulation stops. The angles and the inflow are far outside
+# the validity of the model; the velocity is beyond the speed of sound.
+PLAUSIBLE_POSITION = 1e8  # m
+PLAUSIBLE_VELOCITY = 350.0  # m/s
+PLAUSIBLE_RATE = 100.0  # rad/s
+PLAUSIBLE_ANGLE = 1.5  # rad, multiblade coordinates of flap and lag
+PLAUSIBLE_INFLOW = 1.0
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything that can be told of one instant.
+
+    Attributes
+    ----------
+    step : int
+        Number of the integration step.
+    time : float
+        Simulation time [s].
+    state : ndarray, shape (size,)
+        Simulation state, see `sbs_sim.model.state`.
+    acceleration : ndarray, shape (3,)
+        Inertial acceleration of the c.g. in body axes [m/s^2].
+    swashplate : ndarray, shape (n_rotors, 3)
+        Angles in force [rad].
+    azimuth : ndarray, shape (n_rotors,)
+        [rad], 0 to 2 pi.
+    loads : ndarray, shape (n_rotors, LOAD_SIZE)
+        Thrust, torque, hub force and moment, see `sbs_sim.model.params`.
+    wind : ndarray, shape (3,)
+        Velocity of the air, NED [m/s].
+    """
+
+    step: int
+    time: float
+    state: Array
+    acceleration: Array
+    swashplate: Array
+    azimuth: Array
+    loads: Array
+    wind: Array
+
+
+class Simulation:
+    """An aircraft in flight.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    state : ndarray, shape (size,)
+        Simulation state at the start.
+    swashplate : ndarray, shape (n_rotors, 3)
+        Angles until others are set [rad].
+    tick : float
+        Length of a tick [s], 1e-4 to 1.
+    azimuth_step : float
+        Largest step of the fastest rotor's azimuth [rad]; the step is the tick divided by the smallest whole number
+        that keeps to it.
+    lead_lag, cyclic_inflow : bool
+        Fidelity.
+    method : str
+        "rk4", or "partitioned": the paper's scheme, whose error is of first order in the step.
+    wind : Wind
+
+    Raises
+    ------
+    SimulationError
+        A value out of range or a state that is not plausible, naming it.
+    """
+
+    def __init__(
+        self,
+        aircraft: Aircraft,
+        state: ArrayLike,
+        swashplate: ArrayLike,
+        *,
+        tick: float = 0.01,
+        azimuth_step: float = math.radians(5.0),
+        lead_lag: bool = True,
+        cyclic_inflow: bool = True,
+        method: str = "rk4",
+        wind: Wind | None = None,
+    ) -> None:
+        if not 1e-4 <= tick <= 1.0:
+            raise SimulationError(f"tick = {tick}: allowed are 0.0001 to 1 s")
+        if not math.radians(0.01) <= azimuth_step <= math.radians(45.0):
+            raise SimulationError(f"azimuth_step = {math.degrees(azimuth_step):g} deg: allowed are 0.01 to 45 deg")
+        if method not in METHODS:
+            raise SimulationError(f"method = {method!r}: allowed are {', '.join(METHODS)}")
+        self.aircraft = aircraft
+        self.layout = aircraft.layout
+        self.tick = tick
+        fastest = max(rotor.speed for rotor in aircraft.rotors)
+        # the margin keeps a step that is right but for rounding from being cut once more
+        self.steps_per_tick = max(1, math.ceil(fastest * tick / azimuth_step * (1 - 1e-12)))
+        self.step_size = tick / self.steps_per_tick
+        self._method = METHODS[method]
+        self._params = aircraft.params(lead_lag, cyclic_inflow)
+        self._work = P.make_work(self._params)
+        self._bounds = plausible_bounds(aircraft)
+        self._azimuth0 = np.zeros(len(aircraft.rotors))
+        self._slope = np.zeros(self.layout.size)
+        self.step = 0
+        self._field = WindField(wind or Wind(), 0.0, tick)
+        self._air = self._field.next_tick()
+        self.state = self.checked_state(state)
+        self.swashplate = self.checked_swashplate(swashplate)
+
+    @property
+    def time(self) -> float:
+        """Simulation time [s]."""
+        return self.step * self.step_size
+
+    @property
+    def wind(self) -> Wind:
+        """The wind in force."""
+        return self._field.wind
+
+    def checked_state(self, state: ArrayLike) -> Array:
+        """Copy of a simulation state that is complete, finite and plausible, its quaternion normalised.
+
+        Raises
+        ------
+        SimulationError
+            Naming the state, its value and what is allowed.
+        """
+        values = np.array(state, dtype=float).ravel()
+        if len(values) != self.layout.size:
+            raise SimulationError(f"state has {len(values)} values: allowed are {self.layout.size}")
+        for name, value, bound in zip(self.layout.names, values, self._bounds, strict=True):
+            if not abs(value) <= bound:  # true for a NaN as well
+                raise SimulationError(f"state {name} = {value}: allowed are {-bound:g} to {bound:g}")
+        quaternion = values[S.ATTITUDE : S.ATTITUDE + 4]
+        norm = np.linalg.norm(quaternion)
+        if norm < 0.5:
+            raise SimulationError(f"state attitude has a norm of {norm:g}: allowed are 0.5 to 2, a unit quaternion")
+        values[S.ATTITUDE : S.ATTITUDE + 4] = quaternion / norm
+        return values
+
+    def checked_swashplate(self, angles: ArrayLike) -> Array:
+        """Copy of the swashplate angles of all rotors [rad], shape (n_rotors, 3), if each is within its range.
+
+        Raises
+        ------
+        SimulationError
+            Naming rotor, angle, value and range.
+        """
+        values = np.array(angles, dtype=float)
+        rotors = self.aircraft.rotors
+        if values.shape != (len(rotors), 3):
+            count = values.shape[0] if values.ndim == 2 else values.size
+            raise SimulationError(f"swashplate has {count} rotors: allowed are {len(rotors)}, those of the aircraft")
+        for rotor, row in zip(rotors, values, strict=True):
+            ranges = (rotor.collective_range, rotor.cyclic_range, rotor.cyclic_range)
+            for name, value, (low, high) in zip(S.SWASHPLATE_NAMES, row, ranges, strict=True):
+                if not low - 1e-12 <= value <= high + 1e-12:
+                    raise SimulationError(f"{rotor.name} {name} = {value}: allowed are {low:.6g} to {high:.6g} rad")
+        return values
+
+    def set_swashplate(self, angles: ArrayLike) -> None:
+        """Set the swashplate angles from the next tick on; see `checked_swashplate`."""
+        self.swashplate = self.checked_swashplate(angles)
+
+    def set_wind(self, wind: Wind) -> None:
+        """Set the wind from the next tick on; gust delays count from now."""
+        self._field = WindField(wind, self.time, self.tick)
+        self._air = self._field.next_tick()
+
+    def reset(self, state: ArrayLike, swashplate: ArrayLike) -> None:
+        """Put the aircraft elsewhere; time, azimuths and wind go on."""
+        new_state, new_angles = self.checked_state(state), self.checked_swashplate(swashplate)
+        self.state, self.swashplate = new_state, new_angles
+
+    def advance(self) -> None:
+        """Fly one tick.
+
+        Raises
+        ------
+        SimulationError
+            The next step would leave the finite or the plausible: the message names step, time and state. The state
+            is that of the last good step.
+        """
+        done, culprit = advance(
+            self._params,
+            self.state,
+            self.swashplate,
+            self._azimuth0,
+            self.step,
+            self.steps_per_tick,
+            self.step_size,
+            self._air,
+            self._method,
+            self._bounds,
+            self._work,
+        )
+        self.step += done
+        if culprit >= 0:
+            value = self._work.stages[0][culprit]
+            raise SimulationError(
+                f"step {self.step + 1} (t = {(self.step + 1) * self.step_size:.4f} s) would take"
+                f" {self.layout.names[culprit]} to {value:g}: plausible are magnitudes"
+                f" up to {self._bounds[culprit]:g}"
+            )
+        self._air = self._field.next_tick()
+
+    def snapshot(self) -> Snapshot:
+        """The present instant, with loads and accelerations under the swashplate angles now in force."""
+        speeds = self._params.rotor[:, P.SPEED]
+        azimuth = (self._azimuth0 + speeds * self.step_size * self.step) % (2 * math.pi)
+        air = np.zeros(3)
+        wind_at(self._air, self.time, 0.0, air)
+        derivative(self._params, self.state, self.swashplate, azimuth, air, self._work, self._slope)
+        gravity = rotation_matrix(self.state[3:7])[2] * self._params.air[P.GRAVITY]
+        return Snapshot(
+            step=self.step,
+            time=self.time,
+            state=self.state.copy(),
+            acceleration=self._work.vector[:3] + gravity,
+            swashplate=self.swashplate.copy(),
+            azimuth=azimuth,
+            loads=self._work.loads.copy(),
+            wind=air,
+        )
+
+
+def plausible_bounds(aircraft: Aircraft) -> Array:
+    """Largest plausible magnitude of every state, shape (size,)."""
+    layout = aircraft.layout
+    bounds = np.full(layout.size, PLAUSIBLE_INFLOW)
+    bounds[: S.ATTITUDE] = PLAUSIBLE_POSITION
+    bounds[S.ATTITUDE : S.VELOCITY] = 2.0
+    bounds[S.VELOCITY : S.RATES] = PLAUSIBLE_VELOCITY
+    bounds[S.RATES : S.BODY_SIZE] = PLAUSIBLE_RATE
+    for j, rotor in enumerate(aircraft.rotors):
+        bounds[layout.flap(j)] = bounds[layout.lag(j)] = PLAUSIBLE_ANGLE
+        bounds[layout.flap_rate(j)] = bounds[layout.lag_rate(j)] = PLAUSIBLE_ANGLE * 10 * rotor.speed
+    return bounds
+
+
+def trimmed_state(
+    aircraft: Aircraft,
+    point: TrimPoint,
+    position: ArrayLike = (0.0, 0.0, 0.0),
+    heading: float = 0.0,
+    wind: ArrayLike = (0.0, 0.0, 0.0),
+) -> Array:
+    """Simulation state of a trim point.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    point : TrimPoint
+    position : array_like, shape (3,)
+        NED [m].
+    heading : float
+        From north to east [rad].
+    wind : array_like, shape (3,)
+        Steady wind, NED [m/s]; the aircraft is trimmed relative to the air and drifts with it.
+
+    Returns
+    -------
+    ndarray, shape (size,)
+    """
+    state = aircraft.layout.from_linear(point.state, heading)
+    state[: S.ATTITUDE] = position
+    to_earth = rotation_matrix(euler_to_quaternion(heading, point.pitch, point.roll))
+    state[S.VELOCITY : S.RATES] += to_earth.T @ np.asarray(wind, dtype=float)
+    return state
+
+
+def blade_angles(aircraft: Aircraft, snapshot: Snapshot) -> list[tuple[Array, Array]]:
+    """Flap and lag angle of every blade [rad] as one pair of arrays, each shape (blades,), per rotor."""
+    layout = aircraft.layout
+    pairs = []
+    for j, rotor in enumerate(aircraft.rotors):
+        matrix = blade_matrix(rotor.blades, snapshot.azimuth[j])
+        pairs.append((matrix @ snapshot.state[layout.flap(j)], matrix @ snapshot.state[layout.lag(j)]))
+    return pairs
+
+
+def simulate(
+    aircraft: Aircraft,
+    start: TrimPoint | ArrayLike,
+    controls: ArrayLike | Callable[[float], ArrayLike],
+    duration: float,
+    *,
+    tick: float = 0.01,
+    azimuth_step: float = math.radians(5.0),
+    lead_lag: bool = True,
+    cyclic_inflow: bool = True,
+    method: str = "rk4",
+    wind: Wind | None = None,
+) -> Mapping[str, Array]:
+    """Fly for a while and return what happened.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    start : TrimPoint or ndarray, shape (size,)
+        A trim point, flown from the origin heading north, or a simulation state.
+    controls : array_like or callable
+        Pilot controls [rad]: shape (4,) for the whole flight, shape (n, 4) one row per tick (the last is held), or a
+        function of time [s] that gives shape (4,).
+    duration : float
+        [s], rounded to whole ticks.
+    tick, azimuth_step, lead_lag, cyclic_inflow, method, wind
+        See `Simulation`. A trim point is flown with the velocity of the steady wind added.
+
+    Returns
+    -------
+    dict of str to ndarray
+        "time" (n,) [s], "controls" (n, 4), "swashplate" (n, n_rotors, 3) [rad], "acceleration" (n, 3), "thrust",
+        "torque", "power" (n, n_rotors), every name of the simulation state (n,), and "state" (n, size); n - 1 ticks.
+
+    Raises
+    ------
+    SimulationError
+        See `Simulation`.
+    """
+    if not 0.0 <= duration <= 1e6:
+        raise SimulationError(f"duration = {duration}: allowed are 0 to 1e+06 s")
+    air = wind or Wind()
+    state = trimmed_state(aircraft, start, wind=air.velocity) if isinstance(start, TrimPoint) else start
+    command = _command(controls)
+    simulation = Simulation(
+        aircraft,
+        state,
+        aircraft.mix(command(0, 0.0)),
+        tick=tick,
+        azimuth_step=azimuth_step,
+        lead_lag=lead_lag,
+        cyclic_inflow=cyclic_inflow,
+        method=method,
+        wind=air,
+    )
+    ticks = round(duration / tick)
+    snapshots, given = [], []
+    for i in range(ticks + 1):
+        given.append(command(i, simulation.time))
+        simulation.set_swashplate(aircraft.mix(given[-1]))
+        snapshots.append(simulation.snapshot())
+        if i < ticks:
+            simulation.advance()
+    return _histories(aircraft, snapshots, given)
+
+
+def _command(controls: ArrayLike | Callable[[float], ArrayLike]) -> Callable[[int, float], Array]:
+    """Controls of tick i at a time, whatever way they were given."""
+    if callable(controls):
+        function = controls
+
+        def by_time(_: int, time: float) -> Array:
+            return _four(function(time))
+
+        return by_time
+    rows = np.atleast_2d(np.asarray(controls, dtype=float))
+    if rows.ndim != 2 or rows.shape[1] != len(S.CONTROL_NAMES) or len(rows) == 0:
+        raise SimulationError(f"controls have shape {np.shape(controls)}: allowed are (4,) and (n, 4)")
+    return lambda i, _: rows[min(i, len(rows) - 1)]
+
+
+def _four(values: ArrayLike) -> Array:
+    array = np.asarray(values, dtype=float)
+    if array.shape != (len(S.CONTROL_NAMES),):
+        raise SimulationError(f"controls have shape {array.shape}: allowed is (4,)")
+    return array
+
+
+def _histories(aircraft: Aircraft, snapshots: list[Snapshot], given: list[Array]) -> dict[str, Array]:
+    states = np.array([snapshot.state for snapshot in snapshots])
+    loads = np.array([snapshot.loads for snapshot in snapshots])
+    speeds = np.array([rotor.speed for rotor in aircraft.rotors])
+    named = {name: states[:, i] for i, name in enumerate(aircraft.layout.names)}
+    return named | {
+        "time": np.array([snapshot.time for snapshot in snapshots]),
+        "state": states,
+        "controls": np.array(given),
+        "swashplate": np.array([snapshot.swashplate for snapshot in snapshots]),
+        "acceleration": np.array([snapshot.acceleration for snapshot in snapshots]),
+        "thrust": loads[:, :, P.THRUST],
+        "torque": loads[:, :, P.TORQUE],
+        "power": loads[:, :, P.TORQUE] * speeds,
+    }

@@ -1,0 +1,23 @@
+"""Compile every kernel into its cache, so that no flight waits for the compiler: `python -m sbs_sim.warm_up`."""
+
+import shutil
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.trim import trim
+from sbs_sim.model.kernel import cache_folder
+from sbs_sim.simulation import simulate
+
+
+def main() -> None:
+    """Use every entry once, which compiles it, and delete the machine code of earlier sources."""
+    aircraft = Aircraft.load("sbs")
+    hover = trim(aircraft)
+    simulate(aircraft, hover, hover.controls, duration=0.01)
+    folder = cache_folder()
+    for other in folder.parent.glob("kernels-*"):
+        if other != folder:
+            shutil.rmtree(other, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,959 @@
+"""Plain reference of the complete model (MODEL.md, sections 1 to 7): the yardstick of the fast kernel.
+
+Everything is written for clarity and shares no line with the package. Vectors stand in body axes (FRD) with
+cross products, a blade is three point masses, and loops run over rotors, blades, masses and elements. The
+unknown accelerations follow from one dense linear system whose matrix is the residual of Newton's and Euler's
+equations evaluated at unit accelerations: the residual is affine in them, so that this is exact.
+
+State vector ``x``, flat: ::
+
+    position NED (3) [m], quaternion w x y z, body FRD -> NED (4), velocity U in body axes (3) [m/s],
+    body rate om in body axes (3) [rad/s], then over all rotors, N_b each and multiblade:
+    flap [rad], flap rate [rad/s], lag [rad], lag rate [rad/s],
+    then per rotor lambda0, lambdas, lambdac [-]
+
+Angles in airfoil tables, twist and swashplate phase are radians. ``momentum``, ``first_moment`` and
+``energy`` also take complex numbers, so that tests may differentiate them by a complex step to machine
+precision.
+"""
+
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+#: Smooth floor of the inflow's total velocity V_T, in units of the tip speed (MODEL.md section 6).
+INFLOW_SPEED_FLOOR = 1e-5
+
+
+# ------------------------------------------------------------------------------------------------------------
+# Frames and the multiblade transform (MODEL.md section 1)
+# ------------------------------------------------------------------------------------------------------------
+
+
+def cross(a, b):
+    """Return the vector product a x b, shape (3,); ``np.cross`` spends ten times as long on one pair."""
+    a0, a1, a2 = a
+    b0, b1, b2 = b
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
+def rotation_matrix(quaternion):
+    """Return the matrix that takes body FRD components to NED.
+
+    Parameters
+    ----------
+    quaternion : array, shape (4,)
+        Unit quaternion w, x, y, z, body FRD -> NED.
+
+    Returns
+    -------
+    array, shape (3, 3)
+    """
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def hub_axes(shaft_direction):
+    """Return x_hub and y_hub: the smallest rotation that takes body (0, 0, -1) to u, applied to body x and y.
+
+    For u = (0, 0, 1) the smallest rotation is not unique; the half turn about body x is taken.
+
+    Parameters
+    ----------
+    shaft_direction : array, shape (3,)
+        Unit vector u, up along the shaft, body axes.
+
+    Returns
+    -------
+    x_hub, y_hub : array, shape (3,)
+        Unit vectors, body axes.
+    """
+    up = np.array([0.0, 0.0, -1.0])
+    u = np.asarray(shaft_direction, dtype=float)
+    cosine = up @ u
+    if cosine < -1 + 1e-12:
+        return np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
+    axis = cross(up, u)
+    cross_matrix = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    rotation = np.eye(3) + cross_matrix + cross_matrix @ cross_matrix / (1 + cosine)
+    return rotation[:, 0], rotation[:, 1]
+
+
+def blade_azimuths(blades, psi):
+    """Return psi_k = psi + 2 pi (k - 1) / N_b for k = 1 .. N_b [rad], shape (N_b,)."""
+    return psi + 2 * np.pi * np.arange(blades) / blades
+
+
+def multiblade_matrix(blades, psi, derivative=0):
+    """Return the matrix from multiblade coordinates to blade angles, or its derivative by psi.
+
+    beta_k = a0 - sum_n (a_n cos n psi_k + b_n sin n psi_k) + a_d (-1)^(k-1), coordinates in the order
+    a0, a1, b1, a2, b2, ..., and a_d last where N_b is even (MODEL.md section 1).
+
+    Parameters
+    ----------
+    blades : int
+        Number of blades N_b, 3 or more.
+    psi : float
+        Azimuth of blade 1 [rad].
+    derivative : {0, 1, 2}
+        Order of the derivative by psi.
+
+    Returns
+    -------
+    array, shape (N_b, N_b)
+    """
+    azimuth = blade_azimuths(blades, psi)
+    columns = [np.ones(blades) if derivative == 0 else np.zeros(blades)]
+    for n in range(1, (blades - 1) // 2 + 1):
+        cosine, sine = np.cos(n * azimuth), np.sin(n * azimuth)
+        columns.append(-[cosine, -n * sine, -n * n * cosine][derivative])
+        columns.append(-[sine, n * cosine, -n * n * sine][derivative])
+    if blades % 2 == 0:
+        columns.append((-1.0) ** np.arange(blades) if derivative == 0 else np.zeros(blades))
+    return np.stack(columns, axis=1)
+
+
+def split_state(ac, x, lead_lag=True, cyclic_inflow=True):
+    """Split the flat state into named parts, one array per rotor where the part belongs to rotors.
+
+    Lag off and cyclic inflow off are constraints: what the state holds there is replaced by zeros.
+
+    Returns
+    -------
+    SimpleNamespace
+        position (3,) NED, quaternion (4,), velocity (3,) body, rate (3,) body; flap, flap_rate, lag,
+        lag_rate: lists of (N_b,) multiblade; inflow: list of (3,) lambda0, lambdas, lambdac.
+    """
+    x = np.asarray(x)
+    parts, start = {}, 13
+    for name in ("flap", "flap_rate", "lag", "lag_rate"):
+        parts[name] = []
+        for rotor in ac.rotors:
+            values = x[start : start + rotor.blades]
+            parts[name].append(values if lead_lag or not name.startswith("lag") else 0 * values)
+            start += rotor.blades
+    kept = np.array([1.0, 1.0, 1.0]) if cyclic_inflow else np.array([1.0, 0.0, 0.0])
+    parts["inflow"] = [x[start + 3 * j : start + 3 * j + 3] * kept for j in range(len(ac.rotors))]
+    if len(x) != start + 3 * len(ac.rotors):
+        raise ValueError(f"state of length {len(x)}, expected {start + 3 * len(ac.rotors)}")
+    return SimpleNamespace(position=x[0:3], quaternion=x[3:7], velocity=x[7:10], rate=x[10:13], **parts)
+
+
+# ------------------------------------------------------------------------------------------------------------
+# Mass (MODEL.md sections 2 and 5)
+# ------------------------------------------------------------------------------------------------------------
+
+
+def mass_points(rotor, second_moment=None):
+    """Return three point masses that carry a blade's m_b, S1 and A1.
+
+    The position of a blade's point is affine in s, so that no other integral of the mass enters.
+
+    Parameters
+    ----------
+    rotor : rotor of an aircraft
+    second_moment : float, optional
+        Inertia about the flap hinge [kg m^2] in place of A1 = m_b L^2 / 3.
+
+    Returns
+    -------
+    list of (float, float)
+        Station s from the flap hinge [m] and mass [kg].
+    """
+    length = rotor.radius - rotor.hinge_offset
+    if second_moment is None:
+        second_moment = rotor.blade_mass * length**2 / 3
+    stations = np.array([0.0, length / 2, length])
+    integrals = [rotor.blade_mass, rotor.blade_mass * rotor.blade_cg, second_moment]
+    masses = np.linalg.solve(np.vander(stations, increasing=True).T, integrals)
+    return list(zip(stations, masses, strict=True))
+
+
+def body_mass(ac):
+    """Return mass, first moment and inertia, about the body origin, of what the body's equations carry.
+
+    With `complete` coupling that is the fuselage: the printed totals minus the blades, undeflected and
+    averaged over azimuth. The printed centre of gravity is the origin, so the fuselage alone has minus the
+    blades' first moment. With `paper` coupling it is the printed total.
+
+    Returns
+    -------
+    mass : float
+        [kg]
+    first_moment : array, shape (3,)
+        [kg m], body axes.
+    inertia : array, shape (3, 3)
+        [kg m^2], body axes, about the origin.
+    """
+    mass, first_moment, inertia = ac.body.mass, np.zeros(3), np.array(ac.body.inertia, dtype=float)
+    if ac.options.coupling == "paper":
+        return mass, first_moment, inertia
+    for rotor in ac.rotors:
+        x_hub, y_hub = hub_axes(rotor.shaft_direction)
+        # Four azimuths average second-order harmonics exactly, and the inertia has none higher.
+        for azimuth in (0.0, np.pi / 2, np.pi, 3 * np.pi / 2):
+            span = -np.cos(azimuth) * x_hub + rotor.rotation * np.sin(azimuth) * y_hub
+            for s, point_mass in mass_points(rotor):
+                share = point_mass * rotor.blades / 4
+                r = np.asarray(rotor.hub) + (rotor.hinge_offset + s) * span
+                mass = mass - share
+                first_moment = first_moment - share * r
+                inertia = inertia - share * (r @ r * np.eye(3) - np.outer(r, r))
+    return mass, first_moment, inertia
+
+
+# ------------------------------------------------------------------------------------------------------------
+# Blade kinematics (MODEL.md section 2)
+# ------------------------------------------------------------------------------------------------------------
+
+
+class Blade(NamedTuple):
+    """One blade at one instant: angles [rad], rates [rad/s], then unit vectors and angular velocities."""
+
+    rotor: object
+    azimuth: float
+    flap: float
+    flap_rate: float
+    lag: float
+    lag_rate: float
+    u: np.ndarray
+    e_y: np.ndarray
+    y: np.ndarray
+    t: np.ndarray
+    d: np.ndarray
+    n: np.ndarray
+    f: np.ndarray
+    body_rate: np.ndarray
+    w_hub: np.ndarray
+    w_lag: np.ndarray
+    w_blade: np.ndarray
+
+    @property
+    def lag_arm(self):
+        """Vector from the axis to the lag hinge [m], length e_L = e_0 - e_F."""
+        return (self.rotor.hinge_offset - self.rotor.flap_hinge_offset) * self.e_y
+
+    @property
+    def flap_arm(self):
+        """Vector from the lag hinge to the flap hinge [m], length e_F."""
+        return self.rotor.flap_hinge_offset * self.y
+
+    def position(self, s):
+        """Return the point at station s [m] relative to the hub [m], body axes."""
+        return self.lag_arm + self.flap_arm + s * self.d
+
+    def velocity(self, s, hub_velocity):
+        """Return the velocity [m/s] of the point at station s, body axes, in the frame of `hub_velocity`."""
+        return (
+            hub_velocity
+            + cross(self.w_hub, self.lag_arm)
+            + cross(self.w_lag, self.flap_arm)
+            + s * cross(self.w_blade, self.d)
+        )
+
+    def acceleration(self, s, hub_acceleration, body_rate_dot, flap_dd, lag_dd):
+        """Return the inertial acceleration [m/s^2] of the point at station s, body axes.
+
+        Parameters
+        ----------
+        s : float
+            Station from the flap hinge [m].
+        hub_acceleration : array, shape (3,)
+            Inertial acceleration of the hub [m/s^2].
+        body_rate_dot : array, shape (3,)
+            om' [rad/s^2].
+        flap_dd, lag_dd : float
+            beta'' and xi'' of the blade, in the rotating frame [rad/s^2].
+        """
+        g, omega = self.rotor.rotation, self.rotor.speed
+        alpha_hub = body_rate_dot + cross(self.body_rate, g * omega * self.u)
+        alpha_lag = alpha_hub - g * lag_dd * self.u - g * self.lag_rate * cross(self.w_hub, self.u)
+        alpha_blade = alpha_lag + flap_dd * self.f + self.flap_rate * cross(self.w_lag, self.f)
+        return (
+            hub_acceleration
+            + cross(alpha_hub, self.lag_arm)
+            + cross(self.w_hub, cross(self.w_hub, self.lag_arm))
+            + cross(alpha_lag, self.flap_arm)
+            + cross(self.w_lag, cross(self.w_lag, self.flap_arm))
+            + s * cross(alpha_blade, self.d)
+            + s * cross(self.w_blade, cross(self.w_blade, self.d))
+        )
+
+
+def make_blade(rotor, azimuth, flap, flap_rate, lag, lag_rate, body_rate):
+    """Return the `Blade` at an azimuth [rad], from angles [rad], their rates and the body rate [rad/s]."""
+    g = rotor.rotation
+    u = np.asarray(rotor.shaft_direction, dtype=float)
+    x_hub, y_hub = hub_axes(u)
+    e_y = -np.cos(azimuth) * x_hub + g * np.sin(azimuth) * y_hub
+    e_t = np.sin(azimuth) * x_hub + g * np.cos(azimuth) * y_hub
+    y = np.cos(lag) * e_y - np.sin(lag) * e_t
+    t = np.sin(lag) * e_y + np.cos(lag) * e_t
+    d = np.cos(flap) * y + np.sin(flap) * u
+    n = -np.sin(flap) * y + np.cos(flap) * u
+    f = -g * t
+    w_hub = body_rate + g * rotor.speed * u
+    w_lag = w_hub - g * lag_rate * u
+    w_blade = w_lag + flap_rate * f
+    return Blade(
+        rotor,
+        azimuth,
+        flap,
+        flap_rate,
+        lag,
+        lag_rate,
+        u,
+        e_y,
+        y,
+        t,
+        d,
+        n,
+        f,
+        body_rate,
+        w_hub,
+        w_lag,
+        w_blade,
+    )
+
+
+def make_blades(ac, state, psi):
+    """Return, per rotor, the list of its `Blade`s, from the split state and the azimuths psi [rad]."""
+    rotors = []
+    for j, rotor in enumerate(ac.rotors):
+        transform = multiblade_matrix(rotor.blades, psi[j])
+        transform_dot = rotor.speed * multiblade_matrix(rotor.blades, psi[j], 1)
+        flap, lag = transform @ state.flap[j], transform @ state.lag[j]
+        flap_rate = transform @ state.flap_rate[j] + transform_dot @ state.flap[j]
+        lag_rate = transform @ state.lag_rate[j] + transform_dot @ state.lag[j]
+        azimuths = blade_azimuths(rotor.blades, psi[j])
+        rotors.append(
+            [
+                make_blade(rotor, azimuths[k], flap[k], flap_rate[k], lag[k], lag_rate[k], state.rate)
+                for k in range(rotor.blades)
+            ]
+        )
+    return rotors
+
+
+# ------------------------------------------------------------------------------------------------------------
+# Air loads (MODEL.md sections 4 and 5)
+# ------------------------------------------------------------------------------------------------------------
+
+
+def airfoil_coefficients(airfoil, reynolds, alpha):
+    """Return cl, cd by linear interpolation in Reynolds number (clamped) and in alpha [rad] (periodic).
+
+    The table's cl and cd have shape (number of Reynolds numbers, number of angles).
+    """
+    table_reynolds = np.asarray(airfoil.reynolds, dtype=float)
+    table_alpha = np.asarray(airfoil.alpha, dtype=float)
+    alpha = (alpha - table_alpha[0]) % (2 * np.pi) + table_alpha[0]
+    cl_of_reynolds = [np.interp(alpha, table_alpha, row) for row in airfoil.cl]
+    cd_of_reynolds = [np.interp(alpha, table_alpha, row) for row in airfoil.cd]
+    return (
+        np.interp(reynolds, table_reynolds, cl_of_reynolds),
+        np.interp(reynolds, table_reynolds, cd_of_reynolds),
+    )
+
+
+def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
+    """Return the aerodynamic force of every element of a blade.
+
+    Parameters
+    ----------
+    ac : aircraft
+    blade : Blade
+    swash : array, shape (3,)
+        theta0, A1s, B1s of the rotor [rad].
+    inflow : array, shape (3,)
+        lambda0, lambdas, lambdac [-].
+    air_velocity_hub : array, shape (3,)
+        Velocity of the hub relative to the undisturbed air [m/s], body axes.
+
+    Returns
+    -------
+    list of (float, array of shape (3,))
+        Station s of the element's middle from the flap hinge [m] and its force [N], body axes.
+    """
+    rotor, air = blade.rotor, ac.environment
+    length = rotor.radius - rotor.hinge_offset
+    edges = np.linspace(rotor.root_cutout, length, ac.options.elements + 1)
+    lambda0, lambdas, lambdac = inflow
+    swing = blade.azimuth + rotor.swashplate_phase
+    loads = []
+    for inner, outer in pairwise(edges):
+        s, ds = (inner + outer) / 2, outer - inner
+        chord = rotor.chord_root + (rotor.chord_tip - rotor.chord_root) * s / length
+        pitch = (
+            swash[0]
+            + rotor.twist_root
+            + (rotor.twist_tip - rotor.twist_root) * s / length
+            - swash[1] * rotor.rotation * np.cos(swing)
+            - swash[2] * np.sin(swing)
+            - rotor.pitch_flap_coupling * blade.flap
+            - rotor.pitch_lag_coupling * blade.lag
+        )
+        velocity = blade.velocity(s, air_velocity_hub)
+        cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
+        induced = rotor.speed * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
+        u_t = velocity @ blade.t
+        u_p = velocity @ blade.n + induced * np.cos(blade.flap)
+        # The section sees the flow across the span only: |V| is the speed in the plane of t and n.
+        speed = np.hypot(u_t, u_p)
+        cl, cd = airfoil_coefficients(
+            ac.airfoils[rotor.airfoil], speed * chord / air.kinematic_viscosity, pitch - np.arctan2(u_p, u_t)
+        )
+        lifting_edge = rotor.tip_loss * rotor.radius - rotor.hinge_offset
+        cl = cl * np.clip((lifting_edge - inner) / ds, 0.0, 1.0)
+        pressure = 0.5 * air.air_density * chord * speed * ds
+        force = pressure * ((cl * u_t - cd * u_p) * blade.n - (cl * u_p + cd * u_t) * blade.t)
+        loads.append((s, force))
+    return loads
+
+
+def flat_plate_force(ac, air_velocity):
+    """Return the fuselage's force [N] at the origin from its velocity relative to the air [m/s]."""
+    areas = np.asarray(ac.body.flat_plate_areas, dtype=float)
+    return -0.5 * ac.environment.air_density * areas * np.abs(air_velocity) * air_velocity
+
+
+# ------------------------------------------------------------------------------------------------------------
+# Inflow (MODEL.md section 6)
+# ------------------------------------------------------------------------------------------------------------
+
+
+def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_inflow):
+    """Return d/dt of lambda0, lambdas, lambdac [1/s], Peters and HaQuang's three states.
+
+    Without cyclic inflow the equation left is momentum theory's, M00 lambda0'/Omega + V_T lambda0 / L00 =
+    C_T: the cyclic states are taken out of the gain matrix Lt itself. (Setting them to zero after its
+    inversion would leave (Lt^-1)00, which vanishes at high advance ratio.)
+
+    Parameters
+    ----------
+    ac : aircraft
+    rotor : rotor of the aircraft
+    blades : list of Blade
+    air_loads : list over blades of lists of (s, force)
+    inflow : array, shape (3,)
+        lambda0, lambdas, lambdac [-].
+    air_velocity_hub : array, shape (3,)
+        [m/s], body axes.
+    cyclic_inflow : bool
+
+    Returns
+    -------
+    array, shape (3,)
+    """
+    g, omega, radius = rotor.rotation, rotor.speed, rotor.radius
+    tip_speed = omega * radius
+    u = np.asarray(rotor.shaft_direction, dtype=float)
+    x_hub, y_hub = hub_axes(u)
+
+    force_scale = ac.environment.air_density * np.pi * radius**2 * tip_speed**2
+    if force_scale == 0:  # a vacuum: no loads, and coefficients without a meaning
+        force_scale = 1.0
+    thrust = moment_c = moment_s = 0.0
+    for blade, elements in zip(blades, air_loads, strict=True):
+        for s, force in elements:
+            r = rotor.hinge_offset + s
+            thrust += u @ force
+            moment_c += r * (blade.n @ force) * np.cos(blade.azimuth)
+            moment_s += r * (blade.n @ force) * np.sin(blade.azimuth)
+    coefficients = np.array([thrust, moment_c / radius, moment_s / radius]) / force_scale
+
+    mu_x, mu_y = x_hub @ air_velocity_hub / tip_speed, y_hub @ air_velocity_hub / tip_speed
+    mu_z = -u @ air_velocity_hub / tip_speed
+    lambda0 = inflow[0]
+    lam = lambda0 - mu_z
+    mu2 = mu_x**2 + mu_y**2
+    v_t = np.sqrt(mu2 + lam**2 + INFLOW_SPEED_FLOOR**2)
+    v_m = (mu2 + lam * (lam + lambda0)) / v_t
+    x_c = mu_x / (v_t + abs(lam))
+    x_s = -g * mu_y / (v_t + abs(lam))
+    x2 = x_c**2 + x_s**2
+    k = 15 * np.pi / 64
+    gain = np.array(  # order 0, c, s
+        [
+            [2 * rotor.duct_expansion**2, -k * x_c, -k * x_s],
+            [k * x_c, 2 * (1 + x2) - 4 * x_c**2, -4 * x_c * x_s],
+            [k * x_s, -4 * x_c * x_s, 2 * (1 + x2) - 4 * x_s**2],
+        ]
+    )
+    mass = np.array([8 / (3 * np.pi), 16 / (45 * np.pi), 16 / (45 * np.pi)])
+    if not cyclic_inflow:
+        return np.array([omega * (coefficients[0] - v_t * lambda0 / gain[0, 0]) / mass[0], 0.0, 0.0])
+    lambdas_0cs = np.array([lambda0, inflow[2], inflow[1]])
+    drain = np.array([v_t, v_m, v_m]) * np.linalg.solve(gain, lambdas_0cs)
+    rate_0, rate_c, rate_s = omega * (coefficients - drain) / mass
+    return np.array([rate_0, rate_s, rate_c])
+
+
+# ------------------------------------------------------------------------------------------------------------
+# The coupled system (MODEL.md sections 3 and 5)
+# ------------------------------------------------------------------------------------------------------------
+
+
+class Instant(NamedTuple):
+    """All that the equations need besides the accelerations."""
+
+    ac: object
+    lead_lag: bool
+    body_mass: tuple  # mass, first moment, inertia of `body_mass`
+    gravity: np.ndarray  # body axes [m/s^2]
+    body_rate: np.ndarray  # [rad/s]
+    fuselage_force: np.ndarray  # aerodynamic, at the origin [N]
+    blades: list  # over rotors of lists of Blade
+    air_loads: list  # over rotors, over blades, of lists of (s, force)
+
+
+def unpack(instant, unknowns):
+    """Split the unknowns into a_O (3,), om' (3,), and lists over rotors of beta'' and xi'' (N_b,), per blade.
+
+    a_O = U' + om x U is the inertial acceleration of the body origin.
+    """
+    flap_dd, lag_dd, start = [], [], 6
+    for rotor in instant.ac.rotors:
+        flap_dd.append(unknowns[start : start + rotor.blades])
+        start += rotor.blades
+        if instant.lead_lag:
+            lag_dd.append(unknowns[start : start + rotor.blades])
+            start += rotor.blades
+        else:
+            lag_dd.append(np.zeros(rotor.blades))
+    return unknowns[0:3], unknowns[3:6], flap_dd, lag_dd
+
+
+def hub_motion(instant, rotor, origin_acceleration, body_rate_dot):
+    """Return the hub's linear and the body's angular acceleration as the blades see them.
+
+    `paper` coupling neglects both, the hub's centripetal acceleration included.
+    """
+    if instant.ac.options.coupling == "paper":
+        return np.zeros(3), np.zeros(3)
+    r, om = np.asarray(rotor.hub, dtype=float), instant.body_rate
+    return origin_acceleration + cross(body_rate_dot, r) + cross(om, cross(om, r)), body_rate_dot
+
+
+def hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd, lag_dd):
+    """Return force [N] and moment about the hub [N m] of rotor j's blades on the body, body axes.
+
+    Sum over the blades' mass of dF + g dm - a dm; the blades' weight is left out with `paper` coupling, where
+    the body's equations carry the total weight. The duct is not part of it.
+
+    Returns
+    -------
+    force, moment : array, shape (3,)
+    """
+    ac, rotor = instant.ac, instant.ac.rotors[j]
+    hub_acceleration, alpha = hub_motion(instant, rotor, origin_acceleration, body_rate_dot)
+    weight = np.zeros(3) if ac.options.coupling == "paper" else instant.gravity
+    length = rotor.radius - rotor.hinge_offset
+    force, moment, paper_moment = np.zeros(3), np.zeros(3), np.zeros(3)
+    for k, blade in enumerate(instant.blades[j]):
+        for s, element_force in instant.air_loads[j][k]:
+            force += element_force
+            moment += cross(blade.position(s), element_force)
+            paper_moment += cross(blade.position(s), element_force)
+        for s, point_mass in mass_points(rotor):
+            a = blade.acceleration(s, hub_acceleration, alpha, flap_dd[k], lag_dd[k])
+            force += point_mass * (weight - a)
+            moment += cross(blade.position(s), point_mass * (weight - a))
+        paper_moment += rotor.flap_spring * blade.flap * blade.f
+        if instant.lead_lag:
+            paper_moment -= rotor.blade_mass * length**2 / 3 * flap_dd[k] * blade.f
+    if ac.options.hub_moment == "paper":
+        u = np.asarray(rotor.shaft_direction, dtype=float)
+        moment = paper_moment - u * (u @ paper_moment) + u * (u @ moment)
+    return force, moment
+
+
+def aerodynamic_thrust(instant, j):
+    """Return u . (sum of the aerodynamic force of rotor j's blades) [N]."""
+    u = np.asarray(instant.ac.rotors[j].shaft_direction, dtype=float)
+    return sum(u @ force for elements in instant.air_loads[j] for _, force in elements)
+
+
+def duct_force(instant, j):
+    """Return the duct's force [N] on the body, at the hub along u: (2 a_w - 1) times the rotor's thrust."""
+    rotor = instant.ac.rotors[j]
+    u = np.asarray(rotor.shaft_direction, dtype=float)
+    return (2 * rotor.duct_expansion - 1) * aerodynamic_thrust(instant, j) * u
+
+
+def hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, lag_dd):
+    """Return a blade's moments [N m] left about the flap hinge along f and the lag hinge along -G u.
+
+    Both hinges carry their springs, the lag hinge its damper; a positive moment raises the angle.
+    """
+    ac, rotor, blade = instant.ac, instant.ac.rotors[j], instant.blades[j][k]
+    hub_acceleration, alpha = hub_motion(instant, rotor, origin_acceleration, body_rate_dot)
+    inertia = rotor.blade_mass * rotor.radius**2 / 3 if ac.options.flap_inertia == "axis_to_tip" else None
+    loads = list(instant.air_loads[j][k])
+    for s, point_mass in mass_points(rotor, inertia):
+        a = blade.acceleration(s, hub_acceleration, alpha, flap_dd, lag_dd)
+        loads.append((s, point_mass * (instant.gravity - a)))
+    about_flap, about_lag = np.zeros(3), np.zeros(3)
+    for s, load in loads:
+        about_flap += cross(s * blade.d, load)
+        about_lag += cross(blade.flap_arm + s * blade.d, load)
+    flap = blade.f @ about_flap - rotor.flap_spring * blade.flap
+    lag = (
+        -rotor.rotation * blade.u @ about_lag
+        - rotor.lag_spring * blade.lag
+        - rotor.lag_damping * blade.lag_rate
+    )
+    return flap, lag
+
+
+def residual(instant, unknowns):
+    """Return what is left of all equations of motion at given accelerations: zero at the solution.
+
+    Parameters
+    ----------
+    instant : Instant
+    unknowns : array, shape (n,)
+        a_O = U' + om x U (3) [m/s^2], om' (3) [rad/s^2], then per rotor beta'' (N_b) and, with lag, xi''
+        (N_b) of the blades in the rotating frame [rad/s^2].
+
+    Returns
+    -------
+    array, shape (n,)
+        Force (3) [N], moment about the origin (3) [N m], then per rotor the hinge moments in the unknowns'
+        order.
+    """
+    ac, om, g = instant.ac, instant.body_rate, instant.gravity
+    origin_acceleration, body_rate_dot, flap_dd, lag_dd = unpack(instant, unknowns)
+    mass, about_origin, inertia = instant.body_mass
+    force = instant.fuselage_force + mass * (g - origin_acceleration)
+    force = force - cross(body_rate_dot, about_origin) - cross(om, cross(om, about_origin))
+    moment = cross(about_origin, g - origin_acceleration) - inertia @ body_rate_dot
+    moment = moment - cross(om, inertia @ om)
+    hinges = []
+    for j, rotor in enumerate(ac.rotors):
+        hub_force, hub_moment = hub_loads(
+            instant, j, origin_acceleration, body_rate_dot, flap_dd[j], lag_dd[j]
+        )
+        hub_force = hub_force + duct_force(instant, j)
+        force = force + hub_force
+        moment = moment + hub_moment + cross(np.asarray(rotor.hub, dtype=float), hub_force)
+        pairs = [
+            hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd[j][k], lag_dd[j][k])
+            for k in range(rotor.blades)
+        ]
+        hinges += [flap for flap, _ in pairs]
+        if instant.lead_lag:
+            hinges += [lag for _, lag in pairs]
+    return np.concatenate([force, moment, hinges])
+
+
+def solve_accelerations(instant):
+    """Return the unknown accelerations; the residual, affine in them, gives its matrix column by column."""
+    per_blade = 2 if instant.lead_lag else 1
+    count = 6 + per_blade * sum(rotor.blades for rotor in instant.ac.rotors)
+    constant = residual(instant, np.zeros(count))
+    matrix = np.stack([residual(instant, unit) - constant for unit in np.eye(count)], axis=1)
+    unknowns = np.linalg.solve(matrix, -constant)
+    # A second pass takes off the rounding of the columns, which are differences of large centrifugal loads.
+    return unknowns - np.linalg.solve(matrix, residual(instant, unknowns))
+
+
+def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
+    """Return the `Instant` of a state; arguments as in `plain_derivative`."""
+    state = split_state(ac, x, lead_lag, cyclic_inflow)
+    attitude = rotation_matrix(state.quaternion)
+    air_velocity = state.velocity - attitude.T @ np.asarray(wind, dtype=float)
+    blades = make_blades(ac, state, psi)
+    air_loads = []
+    for j, rotor in enumerate(ac.rotors):
+        air_velocity_hub = air_velocity + cross(state.rate, np.asarray(rotor.hub, dtype=float))
+        air_loads.append(
+            [blade_air_loads(ac, blade, swash[j], state.inflow[j], air_velocity_hub) for blade in blades[j]]
+        )
+    return Instant(
+        ac=ac,
+        lead_lag=lead_lag,
+        body_mass=body_mass(ac),
+        gravity=attitude.T @ np.array([0.0, 0.0, ac.environment.gravity]),
+        body_rate=state.rate,
+        fuselage_force=flat_plate_force(ac, air_velocity),
+        blades=blades,
+        air_loads=air_loads,
+    )
+
+
+def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
+    """Return the derivative of the state and the rotors' loads.
+
+    Parameters
+    ----------
+    ac : aircraft
+    x : array, shape (n,)
+        State, laid out as this module's docstring says.
+    swash : array, shape (n_rotors, 3)
+        theta0, A1s, B1s per rotor [rad].
+    psi : array, shape (n_rotors,)
+        Azimuth of each rotor's first blade [rad].
+    wind : array, shape (3,)
+        Velocity of the air, NED [m/s].
+    lead_lag, cyclic_inflow : bool
+        Off: xi and its derivatives, or lambdas and lambdac, are zero as a constraint.
+
+    Returns
+    -------
+    dx : array, shape (n,)
+        Derivative of the state by time.
+    loads : dict of array
+        ``thrust`` (n_rotors,) [N], u . aerodynamic force of the blades, without the duct; ``torque``
+        (n_rotors,) [N m], what the drive gives to the rotor, -G u . moment; ``force`` and ``moment``
+        (n_rotors, 3) [N, N m], of the blades on the body, body axes, about the hub, with the blades' weight
+        in `complete` coupling and without the duct; ``duct`` (n_rotors,) [N], along u; ``flap_acceleration``
+        and ``lag_acceleration``, lists of (N_b,) [rad/s^2], of the blades in the rotating frame.
+    """
+    state = split_state(ac, x, lead_lag, cyclic_inflow)
+    instant = make_instant(ac, x, swash, psi, wind, lead_lag, cyclic_inflow)
+    attitude = rotation_matrix(state.quaternion)
+    om = state.rate
+    origin_acceleration, body_rate_dot, flap_dd, lag_dd = unpack(instant, solve_accelerations(instant))
+
+    w, vector = state.quaternion[0], state.quaternion[1:]
+    quaternion_rate = 0.5 * np.concatenate([[-vector @ om], w * om + cross(vector, om)])
+
+    flap_rates, flap_accelerations, lag_rates, lag_accelerations, inflow_rates = [], [], [], [], []
+    loads = {"thrust": [], "torque": [], "force": [], "moment": [], "duct": []}
+    air_velocity = state.velocity - attitude.T @ np.asarray(wind, dtype=float)
+    for j, rotor in enumerate(ac.rotors):
+        transform = multiblade_matrix(rotor.blades, psi[j])
+        transform_d = rotor.speed * multiblade_matrix(rotor.blades, psi[j], 1)
+        transform_dd = rotor.speed**2 * multiblade_matrix(rotor.blades, psi[j], 2)
+        for coordinates, rates, accelerations, rate_list, acceleration_list in (
+            (state.flap[j], state.flap_rate[j], flap_dd[j], flap_rates, flap_accelerations),
+            (state.lag[j], state.lag_rate[j], lag_dd[j], lag_rates, lag_accelerations),
+        ):
+            rate_list.append(rates)
+            rest = accelerations - 2 * transform_d @ rates - transform_dd @ coordinates
+            acceleration_list.append(np.linalg.solve(transform, rest))
+        air_velocity_hub = air_velocity + cross(om, np.asarray(rotor.hub, dtype=float))
+        inflow_rates.append(
+            inflow_rate(
+                ac,
+                rotor,
+                instant.blades[j],
+                instant.air_loads[j],
+                state.inflow[j],
+                air_velocity_hub,
+                cyclic_inflow,
+            )
+        )
+        force, moment = hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd[j], lag_dd[j])
+        u = np.asarray(rotor.shaft_direction, dtype=float)
+        loads["thrust"].append(aerodynamic_thrust(instant, j))
+        loads["torque"].append(-rotor.rotation * u @ moment)
+        loads["force"].append(force)
+        loads["moment"].append(moment)
+        loads["duct"].append((2 * rotor.duct_expansion - 1) * aerodynamic_thrust(instant, j))
+    dx = np.concatenate(
+        [
+            attitude @ state.velocity,
+            quaternion_rate,
+            origin_acceleration - cross(om, state.velocity),
+            body_rate_dot,
+            *flap_rates,
+            *flap_accelerations,
+            *lag_rates,
+            *lag_accelerations,
+            *inflow_rates,
+        ]
+    )
+    loads = {name: np.array(values) for name, values in loads.items()}
+    return dx, {**loads, "flap_acceleration": flap_dd, "lag_acceleration": lag_dd}
+
+
+# ------------------------------------------------------------------------------------------------------------
+# Integrals of the motion
+# ------------------------------------------------------------------------------------------------------------
+
+
+def _blade_points(ac, state, psi):
+    """Yield each point's position from the body origin [m], inertial velocity [m/s] and mass [kg]."""
+    for j, blades in enumerate(make_blades(ac, state, psi)):
+        hub = np.asarray(ac.rotors[j].hub, dtype=float)
+        hub_velocity = state.velocity + cross(state.rate, hub)
+        for blade in blades:
+            for s, point_mass in mass_points(ac.rotors[j]):
+                yield hub + blade.position(s), blade.velocity(s, hub_velocity), point_mass
+
+
+def first_moment(ac, x, psi):
+    """Return the first moment of fuselage and blades about the inertial origin [kg m], NED, shape (3,)."""
+    state = split_state(ac, x)
+    mass, about_origin, _ = body_mass(ac)
+    for position, _, point_mass in _blade_points(ac, state, psi):
+        mass, about_origin = mass + point_mass, about_origin + point_mass * position
+    return mass * state.position + rotation_matrix(state.quaternion) @ about_origin
+
+
+def momentum(ac, x, psi):
+    """Return linear and angular momentum of fuselage and blades; for `complete` coupling.
+
+    Parameters
+    ----------
+    ac : aircraft
+    x : array, shape (n,)
+    psi : array, shape (n_rotors,)
+
+    Returns
+    -------
+    p : array, shape (3,)
+        Linear momentum, NED [kg m/s].
+    h : array, shape (3,)
+        Angular momentum about the inertial origin, NED [kg m^2/s].
+    """
+    state = split_state(ac, x)
+    mass, about_origin, inertia = body_mass(ac)
+    linear = mass * state.velocity + cross(state.rate, about_origin)
+    angular = cross(about_origin, state.velocity) + inertia @ state.rate
+    for position, velocity, point_mass in _blade_points(ac, state, psi):
+        linear = linear + point_mass * velocity
+        angular = angular + cross(position, point_mass * velocity)
+    attitude = rotation_matrix(state.quaternion)
+    p = attitude @ linear
+    return p, cross(state.position, p) + attitude @ angular
+
+
+def energy(ac, x, psi):
+    """Return kinetic energy plus that of weight and springs [J]; for `complete` coupling.
+
+    Each drive adds torque times speed, the lag dampers take C xi'^2, and the air its share.
+    """
+    state = split_state(ac, x)
+    mass, about_origin, inertia = body_mass(ac)
+    v, om = state.velocity, state.rate
+    total = 0.5 * mass * v @ v + v @ cross(om, about_origin) + 0.5 * om @ inertia @ om
+    for _, velocity, point_mass in _blade_points(ac, state, psi):
+        total = total + 0.5 * point_mass * velocity @ velocity
+    for rotor, blades in zip(ac.rotors, make_blades(ac, state, psi), strict=True):
+        for blade in blades:
+            total = total + 0.5 * (rotor.flap_spring * blade.flap**2 + rotor.lag_spring * blade.lag**2)
+    return total - ac.environment.gravity * first_moment(ac, x, psi)[2]
+
+
+# ------------------------------------------------------------------------------------------------------------
+# An aircraft to test with
+# ------------------------------------------------------------------------------------------------------------
+
+
+def smooth_airfoil(lift_slope=5.73):
+    """Return an airfoil table of simple shape: cl ~ sin 2 alpha, cd ~ sin^2 alpha, slowly varying with Re."""
+    reynolds = np.array([2.5e4, 1e5, 3e5, 6e5])
+    alpha = np.radians(np.linspace(-180.0, 180.0, 361))
+    growth = (reynolds / 3e5)[:, None] ** 0.05
+    cl = growth * lift_slope / 2 * np.sin(2 * alpha)
+    cd = 0.0105 / growth**5 + 1.2 * np.sin(alpha) ** 2
+    return SimpleNamespace(reynolds=reynolds, alpha=alpha, cl=cl, cd=cd)
+
+
+def table6_aircraft(environment=None, body=None, options=None, rotors=None):
+    """Return the paper's aircraft (its Table 6) as nested namespaces, with changes.
+
+    Parameters
+    ----------
+    environment, body, options : dict, optional
+        Attributes to change.
+    rotors : dict, optional
+        Attributes to change; a list or tuple of two has one value for each rotor.
+
+    Returns
+    -------
+    SimpleNamespace
+        With the attributes of `sbs_sim.aircraft.Aircraft` that the model reads.
+    """
+    rotor = {
+        "shaft_direction": np.array([0.0, 0.0, -1.0]),
+        "speed": 2400 * 2 * np.pi / 60,
+        "radius": 0.505,
+        "blades": 3,
+        "blade_mass": 0.1613,
+        "blade_cg": 0.224,
+        "hinge_offset": 0.075,
+        "flap_hinge_offset": 0.0075,
+        "flap_spring": 162.0,
+        "lag_spring": 0.0,
+        "lag_damping": 0.0,
+        "pitch_flap_coupling": 0.0,
+        "pitch_lag_coupling": 0.0,
+        "chord_root": 0.051,
+        "chord_tip": 0.051,
+        "twist_root": 0.0,
+        "twist_tip": 0.0,
+        "root_cutout": 0.0,
+        "tip_loss": 1.0,
+        "swashplate_phase": np.radians(-72.0),
+        "airfoil": "smooth",
+        "duct_expansion": 0.5,
+    }
+    each = [
+        {**rotor, "name": "MR1", "hub": np.array([0.0, -0.645, 0.066]), "rotation": -1},
+        {**rotor, "name": "MR2", "hub": np.array([0.0, 0.645, 0.066]), "rotation": 1},
+    ]
+    for name, value in (rotors or {}).items():
+        for j in range(2):
+            each[j][name] = value[j] if isinstance(value, list | tuple) else value
+    return SimpleNamespace(
+        environment=SimpleNamespace(
+            **{
+                "air_density": 1.225,
+                "kinematic_viscosity": 1.46e-5,
+                "gravity": 9.80665,
+                **(environment or {}),
+            }
+        ),
+        body=SimpleNamespace(
+            **{
+                "mass": 20.62,
+                "inertia": np.array([[3.532, -0.001, -0.052], [-0.001, 2.222, 0.0], [-0.052, 0.0, 5.342]]),
+                "flat_plate_areas": np.array([0.08, 0.15, 0.30]),
+                **(body or {}),
+            }
+        ),
+        options=SimpleNamespace(
+            **{
+                "coupling": "complete",
+                "hub_moment": "complete",
+                "flap_inertia": "hinge_to_tip",
+                "elements": 20,
+                **(options or {}),
+            }
+        ),
+        rotors=tuple(SimpleNamespace(**values) for values in each),
+        airfoils={"smooth": smooth_airfoil()},
+    )
+
+
+def random_state(ac, rng, size=1.0):
+    """Return a random state of unlikely violence: 20 m/s, 2 rad/s, flap and lag of 0.1 rad, times `size`."""
+    quaternion = rng.normal(size=4)
+    count = sum(rotor.blades for rotor in ac.rotors)
+    inflow = [np.array([0.06, 0.0, 0.0]) + size * rng.normal(scale=0.02, size=3) for _ in ac.rotors]
+    return np.concatenate(
+        [
+            size * rng.normal(scale=50.0, size=3),
+            quaternion / np.linalg.norm(quaternion),
+            size * rng.normal(scale=20.0, size=3),
+            size * rng.normal(scale=2.0, size=3),
+            size * rng.normal(scale=0.1, size=count),
+            size * rng.normal(scale=10.0, size=count),
+            size * rng.normal(scale=0.1, size=count),
+            size * rng.normal(scale=10.0, size=count),
+            *inflow,
+        ]
+    )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.errors import AircraftError
+from sbs_sim.errors import AircraftError, AirfoilError
 from sbs_sim.model import params as P
 from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells, read_table
 from sbs_sim.model.frames import hub_axes
@@ -21,6 +21,15 @@ from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES, StateLayout
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
+
+# what a schema calls its types, in words
+TYPE_WORDS = {
+    "number": "a number",
+    "integer": "a whole number",
+    "string": "a text",
+    "array": "a list",
+    "object": "a mapping of keys to values",
+}
 
 
 @dataclass(frozen=True)
@@ -182,7 +191,7 @@ class Aircraft:
         AircraftError
             One line that names the file and every wrong key with its value and what is allowed.
         """
-        path = _find(path_or_name, "aircraft", ".yaml")
+        path = _find(path_or_name, "aircraft", ".yaml", Path())
         try:
             return cls.from_dict(_read_yaml(path), path.parent)
         except AircraftError as error:
@@ -212,7 +221,7 @@ class Aircraft:
             description=data.get("description", ""),
             environment=Environment(**{key: float(value) for key, value in data["environment"].items()}),
             body=Body(float(body["mass"]), _frozen(body["inertia"]), _frozen(body["flat_plate_areas"])),
-            options=Options(**data["options"]),
+            options=Options(**{**data["options"], "elements": int(data["options"]["elements"])}),
             control_ranges={name: _radians(data["controls"][name]["range_deg"]) for name in CONTROL_NAMES},
             rotors=rotors,
             airfoils=_load_airfoils(rotors, folder or Path.cwd()),
@@ -314,24 +323,30 @@ def config_folder() -> Path:
     raise AircraftError(f"no folder config/aircraft beside {here.parent} and none under share/sbs_sim above it")
 
 
-def _find(path_or_name: str | Path, kind: str, suffix: str, folder: Path | None = None) -> Path:
-    """Path of a configuration file given by path or by name."""
+def _find(path_or_name: str | Path, kind: str, suffix: str, folder: Path) -> Path:
+    """Path of a configuration file given by path, relative ones from `folder`, or by name."""
     given = Path(path_or_name)
-    folders = [Path(), *([folder] if folder else []), config_folder() / kind]
-    for place in folders:
+    for place in (folder, config_folder() / kind):
         for candidate in (place / given, place / f"{given}{suffix}"):
-            if candidate.is_file():
+            if _is_file(candidate):
                 return candidate
     known = ", ".join(sorted(path.stem for path in (config_folder() / kind).glob(f"*{suffix}")))
     raise AircraftError(f"{kind.rstrip('s')} = {str(path_or_name)!r}: allowed are a file's path or one of {known}")
 
 
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that no file can have, a folder that may not be entered
+        return False
+
+
 def _read_yaml(path: Path) -> Any:
-    from ruamel.yaml import YAML, YAMLError  # here, because it is slow to import and needed once
+    from ruamel.yaml import YAML  # here, because it is slow to import and needed once
 
     try:
         return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
-    except (YAMLError, UnicodeDecodeError, OSError) as error:
+    except Exception as error:  # the parser lets out all kinds: for "!!int x", a 31st of June, deep nesting
         raise AircraftError("not readable as YAML: " + " ".join(str(error).split())) from None
 
 
@@ -341,11 +356,12 @@ def _check_schema(data: Any) -> None:
 
     schema = json.loads((config_folder() / "aircraft.schema.json").read_text(encoding="utf-8"))
     errors = sorted(Draft202012Validator(schema).iter_errors(data), key=lambda error: list(map(str, error.path)))
-    problems = [_explain(error) for error in errors] + [
+    # only data that the schema accepts have a structure that is known, in which the search comes to an end
+    problems = [_explain(error) for error in errors] or [
         f"{path} = {value}: allowed is a finite number" for path, value in _not_finite(data, "")
     ]
     if problems:
-        raise AircraftError("; ".join(problems))
+        raise AircraftError("; ".join(dict.fromkeys(problems)))
 
 
 def _not_finite(data: Any, path: str) -> list[tuple[str, float]]:
@@ -363,14 +379,14 @@ def _explain(error: Any) -> str:
     rule, limit, value = error.validator, error.validator_value, error.instance
     if rule == "additionalProperties":
         known = error.schema["properties"]
-        unknown = [str(key) for key in value if key not in known]
+        unknown = [_key(key) for key in value if key not in known]
         where = ", ".join(f"{path}.{key}".lstrip(".") for key in unknown)
         return f"{where}: unknown key, allowed are {', '.join(known)}"
     if rule == "required":
         missing = [key for key in limit if key not in value]
         return f"{', '.join(f'{path}.{key}'.lstrip('.') for key in missing)}: missing key"
     allowed = {
-        "type": f"of type {limit}",
+        "type": TYPE_WORDS.get(str(limit), f"of type {limit}"),
         "enum": "one of " + ", ".join(map(str, limit)) if rule == "enum" else "",
         "minimum": f">= {limit}",
         "maximum": f"<= {limit}",
@@ -380,6 +396,10 @@ def _explain(error: Any) -> str:
         "minLength": "a text that is not empty",
     }.get(rule, error.message)
     return f"{path or 'file'} = {_short(value)}: allowed is {allowed}"
+
+
+def _key(key: Any) -> str:
+    return key if isinstance(key, str) and key.isprintable() else _short(key)
 
 
 def _short(value: Any) -> str:
@@ -436,7 +456,10 @@ def _load_airfoils(rotors: tuple[Rotor, ...], folder: Path) -> dict[str, Airfoil
             except AircraftError as error:
                 raise AircraftError(f"rotors[{i}].{error}") from None
             aspect_ratio = 2 * rotor.radius / (rotor.chord_root + rotor.chord_tip)
-            tables[rotor.airfoil] = read_table(path, aspect_ratio)
+            try:
+                tables[rotor.airfoil] = read_table(path, aspect_ratio)
+            except AirfoilError as error:
+                raise AirfoilError(f"rotors[{i}].airfoil = {rotor.airfoil!r}: {error}") from None
     return tables
 
 
@@ -523,9 +546,13 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
             "flap_hinge_offset",
             f"<= {rotor.hinge_offset:g}, the hinge_offset",
         ),
-        (rotor.root_cutout < length, "root_cutout", f"< {length:g}, from the flap hinge to the tip"),
         (
-            rotor.blade_cg <= length / math.sqrt(3),
+            rotor.root_cutout < length or length <= 0,
+            "root_cutout",
+            f"< {length:g}, from the flap hinge to the tip",
+        ),
+        (
+            rotor.blade_cg <= length / math.sqrt(3) or length <= 0,
             "blade_cg",
             f"<= {length / math.sqrt(3):.6g}, L/sqrt(3): the blade's second moment is m_b L^2/3",
         ),

@@ -5,11 +5,14 @@ reset, wind, pause, step) is put in a mailbox and carried out between two ticks,
 """
 
 import collections
+import contextlib
+import math
 import queue
 import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from concurrent.futures import TimeoutError as NoAnswerYet  # not the built-in one before Python 3.11
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,20 +85,22 @@ class FlightLoop:
 
     def __init__(self, simulation: Simulation, real_time_factor: float = 1.0, command_timeout: float = 0.5) -> None:
         self._simulation = simulation
+        self._wake = threading.Condition()
         self.set_pace(real_time_factor)
         self.set_command_timeout(command_timeout)
         self.reports: queue.Queue[Report | None] = queue.Queue(QUEUE_LENGTH)
         self._mailbox: collections.deque[tuple[Callable[[], Any], Future[Any]]] = collections.deque()
-        self._wake = threading.Condition()
         self._thread = threading.Thread(target=self._run, name="flight", daemon=True)
         self._playing = True
         self._stopping = False
         self._fault = ""
         self._missed = self._dropped = 0
-        self._command: np.ndarray | None = None
+        # At most the newest command. A deque, for it is emptied and filled by two threads and loses nothing.
+        self._commands: collections.deque[np.ndarray] = collections.deque(maxlen=1)
         self._command_time: float | None = None
         self._anchor = 0.0  # wall time at which the tick `_anchor_tick` was due
         self._ticks_due = 0
+        self._deadline = math.inf  # wall time by which the tick that is flown should be ready
         self._marks: collections.deque[tuple[float, float]] = collections.deque()
 
     # ------------------------------------------------------------------------------------------- from any thread
@@ -116,14 +121,17 @@ class FlightLoop:
                 self.reports.put_nowait(None)
                 return
             except queue.Full:  # there is no reader any more: the end matters more than the oldest report
-                self.reports.get_nowait()
+                with contextlib.suppress(queue.Empty):
+                    self.reports.get_nowait()
 
     def set_pace(self, real_time_factor: float) -> None:
         """Set the wanted real-time factor, 0 to 1000."""
         if not 0.0 <= real_time_factor <= 1000.0:
             raise SimulationError(f"real_time_factor = {real_time_factor}: allowed are 0 to 1000")
-        self._pace = real_time_factor
-        self._replan = True
+        with self._wake:
+            self._pace = real_time_factor
+            self._replan = True
+            self._wake.notify()
 
     def set_command_timeout(self, seconds: float) -> None:
         """Set the age at which a command counts as timed out [s]; 0 is never."""
@@ -139,7 +147,7 @@ class FlightLoop:
         SimulationError
             See `Simulation.checked_swashplate`; what was commanded before stays in force.
         """
-        self._command = self._simulation.checked_swashplate(swashplate)
+        self._commands.append(self._simulation.checked_swashplate(swashplate))
 
     def call(self, function: Callable[[], Any], timeout: float = 10.0) -> Any:
         """Carry out a function in the flight's thread between two ticks and return its result.
@@ -147,18 +155,22 @@ class FlightLoop:
         Raises
         ------
         SimulationError
-            No answer in time, because the loop has ended.
+            The loop has ended, or there is no answer in time; what has not begun by then will not be done.
         Exception
             Whatever the function raises.
         """
         answer: Future[Any] = Future()
         with self._wake:
+            if self._stopping:
+                raise SimulationError("the flight has ended")
             self._mailbox.append((function, answer))
             self._wake.notify()
         try:
             return answer.result(timeout)
-        except TimeoutError:
-            raise SimulationError(f"the flight did not answer within {timeout:g} s") from None
+        except NoAnswerYet:
+            if answer.cancel() or not answer.done():
+                raise SimulationError(f"the flight did not answer within {timeout:g} s") from None
+            return answer.result()
 
     def pause(self, pause: bool) -> None:
         """Pause or go on; refused while a fault lasts."""
@@ -203,10 +215,15 @@ class FlightLoop:
                 self._rest()
             elif self._wait_until_due():
                 self._tick()
+        for _, answer in self._mailbox:
+            if answer.set_running_or_notify_cancel():
+                answer.set_exception(SimulationError("the flight has ended"))
 
     def _empty_mailbox(self) -> None:
         while self._mailbox:
             function, answer = self._mailbox.popleft()
+            if not answer.set_running_or_notify_cancel():
+                continue  # its caller has given up
             try:
                 answer.set_result(function())
             except Exception as error:
@@ -222,37 +239,38 @@ class FlightLoop:
             self._report(with_snapshot=False)
 
     def _wait_until_due(self) -> bool:
-        """Sleep until the next tick is due; false if mail or the end came first."""
-        if self._pace == 0.0:
+        """Sleep until the next tick is due; false if mail, another pace or the end came first."""
+        with self._wake:
+            pace, replan, self._replan = self._pace, self._replan, False
+        if pace == 0.0:
+            self._deadline = math.inf
             return True
         now = time.monotonic()
-        period = self._simulation.tick / self._pace
-        if self._replan or now - self._anchor - self._ticks_due * period > HURRY_TICKS * period:
-            self._anchor, self._ticks_due, self._replan = now, 0, False
+        period = self._simulation.tick / pace
+        if replan or now - self._anchor - self._ticks_due * period > HURRY_TICKS * period:
+            self._anchor, self._ticks_due = now, 0
         due = self._anchor + self._ticks_due * period
         while (left := due - time.monotonic()) > 0:
             with self._wake:
-                if self._mailbox or self._stopping:
+                if self._mailbox or self._stopping or self._replan:
                     return False
-                self._wake.wait(left)
+                self._wake.wait(min(left, RATE_WINDOW))
+        self._deadline = due + period
         return True
 
     def _tick(self) -> None:
         """One tick, with its deadline looked after."""
         self._fly()
-        if self._pace > 0.0:
-            period = self._simulation.tick / self._pace
-            self._ticks_due += 1
-            if time.monotonic() > self._anchor + self._ticks_due * period:
-                self._missed += 1
-        self._report(patient=self._pace == 0.0)
+        self._ticks_due += 1
+        if time.monotonic() > self._deadline:
+            self._missed += 1
+        self._report(patient=self._as_fast_as_read)
 
     def _fly(self) -> None:
         """Take the newest command and fly one tick; a fault pauses."""
         simulation = self._simulation
-        command, self._command = self._command, None
-        if command is not None:
-            simulation.swashplate = command  # checked when it came
+        with contextlib.suppress(IndexError):  # there is none
+            simulation.swashplate = self._commands.pop()  # checked when it came
             self._command_time = simulation.time
         try:
             simulation.advance()
@@ -276,7 +294,7 @@ class FlightLoop:
                 self._replan = True
                 self._marks.clear()
         self._playing = playing
-        self._report(with_snapshot=False)
+        self._report(with_snapshot=False, patient=self._as_fast_as_read)
 
     def _check_fault(self) -> None:
         if self._fault:
@@ -288,8 +306,13 @@ class FlightLoop:
     def _reset(self, state: ArrayLike, swashplate: ArrayLike) -> None:
         self._simulation.reset(state, swashplate)
         self._fault = ""
-        self._command = self._command_time = None
-        self._report()
+        self._commands.clear()
+        self._command_time = None
+        self._report(patient=self._as_fast_as_read)
+
+    @property
+    def _as_fast_as_read(self) -> bool:
+        return self._pace == 0.0
 
     def _report(self, with_snapshot: bool = True, patient: bool = False) -> None:
         """Hand out the present state; a patient report waits for its reader, another is dropped if there is none."""

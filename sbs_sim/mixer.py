@@ -37,19 +37,22 @@ class Mixer:
         self._swash_low, self._swash_high = swash[:, :, 0], swash[:, :, 1]
         self._rates = np.array([[rotor.swashplate_rate] for rotor in aircraft.rotors])
         self._target: Array | None = None
+        self._followed: Array | None = None  # the target in force since the last `move`
         self._angles: Array | None = None
         self._time = 0.0
         self.saturated: tuple[str, ...] = ()
 
     def set_target(self, controls: ArrayLike) -> None:
-        """Set the pilot controls [rad], shape (4,).
+        """Set the pilot controls [rad], shape (4,), that count from the next `move` on.
 
         Raises
         ------
         SimulationError
-            A control is not finite or beyond a right angle; the target before stays.
+            Not four controls, or one that is not finite or beyond a right angle; the target before stays.
         """
         values = np.asarray(controls, dtype=float)
+        if values.shape != (len(CONTROL_NAMES),):
+            raise SimulationError(f"controls have shape {values.shape}: allowed is ({len(CONTROL_NAMES)},)")
         for name, value in zip(CONTROL_NAMES, values, strict=True):
             if not abs(value) <= math.pi / 2:  # true for a NaN as well
                 raise SimulationError(f"{name} = {value}: allowed are -1.5708 to 1.5708 rad")
@@ -64,8 +67,9 @@ class Mixer:
     def move(self, time: float) -> Array:
         """Swashplate angles [rad], shape (n_rotors, 3), at a time [s].
 
-        They move towards the target at their actuators' rates. Where the swashplates stand before the first target is
-        not known, so they are at the first target at once.
+        They move towards the target at their actuators' rates; until this time that is the target of the last
+        call, so that a new one after a long rest does not make them jump. Where the swashplates stand before the
+        first target is not known, so they are at the first target at once.
 
         Raises
         ------
@@ -74,18 +78,21 @@ class Mixer:
         """
         if self._target is None:
             raise SimulationError("the mixer has no controls yet")
-        if self._angles is None:
+        if self._angles is None or self._followed is None:
             self._angles = self._target.copy()
         else:
             reach = self._rates * max(0.0, time - self._time)
-            self._angles = self._angles + np.clip(self._target - self._angles, -reach, reach)
+            self._angles = self._angles + np.clip(self._followed - self._angles, -reach, reach)
+        self._followed = self._target
         self._time = time
         return self._angles.copy()
 
     @property
     def arrived(self) -> bool:
         """True when the angles are those of the target."""
-        return self._target is None or np.array_equal(self._angles, self._target)
+        if self._target is None:
+            return True
+        return self._angles is not None and np.array_equal(self._angles, self._target)
 
 
 def _clipped(names: tuple[str, ...] | list[str], wanted: Array, limited: Array) -> list[str]:

@@ -161,7 +161,7 @@ class Simulation:
                 raise SimulationError(f"state {name} = {value}: allowed are {-bound:g} to {bound:g}")
         quaternion = values[S.ATTITUDE : S.ATTITUDE + 4]
         norm = np.linalg.norm(quaternion)
-        if norm < 0.5:
+        if not 0.5 <= norm <= 2.0:
             raise SimulationError(f"state attitude has a norm of {norm:g}: allowed are 0.5 to 2, a unit quaternion")
         values[S.ATTITUDE : S.ATTITUDE + 4] = quaternion / norm
         return values
@@ -177,8 +177,10 @@ class Simulation:
         values = np.array(angles, dtype=float)
         rotors = self.aircraft.rotors
         if values.shape != (len(rotors), 3):
-            count = values.shape[0] if values.ndim == 2 else values.size
-            raise SimulationError(f"swashplate has {count} rotors: allowed are {len(rotors)}, those of the aircraft")
+            if values.ndim == 2 and values.shape[1] == 3:
+                allowed = f"{len(rotors)}, those of the aircraft"
+                raise SimulationError(f"swashplate has {len(values)} rotors: allowed are {allowed}")
+            raise SimulationError(f"swashplate has shape {values.shape}: allowed is {(len(rotors), 3)}")
         for rotor, row in zip(rotors, values, strict=True):
             ranges = (rotor.collective_range, rotor.cyclic_range, rotor.cyclic_range)
             for name, value, (low, high) in zip(S.SWASHPLATE_NAMES, row, ranges, strict=True):

@@ -395,7 +395,7 @@ def test_paper_hub_moment_in_a_vacuum():
 
 
 def test_paper_coupling_carries_the_total_mass():
-    """The body has m (U' + om x U) = F + m g and I om' + om x I om = Sum(M + r x F), the hub loads no weight."""
+    """The body equations as printed, with total mass and inertia; the hub loads hold no weight."""
     rng = np.random.default_rng(14)
     ac = tilted_aircraft(options={"coupling": "paper"}, rotors={"duct_expansion": 0.7})
     x, psi = random_state(ac, rng), rng.uniform(0, 2 * np.pi, size=2)
@@ -523,6 +523,26 @@ def test_swashplate_signs():
                 assert (force @ blade.n) / -(force @ blade.t) == pytest.approx(cl / cd, rel=1e-9)
 
 
+def test_sections_see_the_inflow():
+    """Inflow lambda0 + r/R (lambdac cos psi + lambdas sin psi), by cos b; lift stands across the flow."""
+    ac = table6_aircraft(options={"elements": 1})
+    lift_only = plain_model.smooth_airfoil()
+    lift_only.cd = 0 * lift_only.cd
+    ac.airfoils = {"smooth": lift_only}
+    lambda0, lambdas, lambdac = 0.05, 0.02, -0.03
+    for rotor in ac.rotors:
+        for azimuth, flap in ((0.4, 0.0), (2.1, 0.3), (4.0, -0.3)):
+            blade = plain_model.make_blade(rotor, azimuth, flap, 0, 0, 0, CALM)
+            inflow = np.array([lambda0, lambdas, lambdac])
+            [(s, force)] = plain_model.blade_air_loads(ac, blade, [0.3, 0, 0], inflow, CALM)
+            share = (rotor.hinge_offset + s) / rotor.radius
+            flow = lambda0 + share * (lambdac * np.cos(azimuth) + lambdas * np.sin(azimuth))
+            u_p = rotor.speed * rotor.radius * flow * np.cos(flap)
+            u_t = rotor.speed * (rotor.hinge_offset + s * np.cos(flap))
+            assert force @ blade.n > 0
+            assert -(force @ blade.t) / (force @ blade.n) == pytest.approx(u_p / u_t, rel=1e-10)
+
+
 def test_tip_loss_and_root_cutout():
     """Outside B R no lift but drag; a part of an element counts by its share; none inside the cutout."""
     states = {}
@@ -627,6 +647,47 @@ def test_gain_matrix_turns_with_the_wind():
     np.testing.assert_allclose(size, size[0], rtol=1e-6)
 
 
+def test_cyclic_gain_along_and_across_the_wake():
+    """2 (1 - X^2) along the wake and 2 (1 + X^2) across it, for any direction of the wind."""
+    ac, lambda0, speed = table6_aircraft(), 0.03, 15.0
+    omega, tip_speed = ac.rotors[1].speed, ac.rotors[1].speed * ac.rotors[1].radius
+    mu = speed / tip_speed
+    v_t = np.hypot(mu, lambda0)
+    v_m = (mu**2 + 2 * lambda0**2) / v_t
+    x = mu / (v_t + lambda0)
+    k = 15 * np.pi / 64
+    along = 2 * (1 - x**2) + 2 * (k * x) ** 2  # the uniform state, held still, adds its share
+    expected = -omega * v_m * 45 * np.pi / 16 * np.array([1 / along, 1 / (2 * (1 + x**2))])
+    for direction in np.linspace(0, 6, 5):
+        velocity = [speed * np.cos(direction), speed * np.sin(direction), 0.0]
+        cyclic = inflow_slope(ac, np.array([lambda0, 0.0, 0.0]), velocity)[1:, 1:]
+        np.testing.assert_allclose(np.linalg.eigvals(cyclic).min(), expected.min(), rtol=1e-5)
+        np.testing.assert_allclose(np.linalg.eigvals(cyclic).max(), expected.max(), rtol=1e-5)
+        across = np.array([np.cos(direction), np.sin(direction)])  # of the wake's (-sin, cos), in order s, c
+        np.testing.assert_allclose(cyclic @ across, expected[1] * across, rtol=1e-4, atol=1e-3)
+
+
+def test_climb_carries_the_wake_away():
+    """Axial flight: V_T = lambda0 + climb speed, which drains the uniform inflow."""
+    ac, lambda0, climb = table6_aircraft(), 0.05, 4.0
+    rotor = ac.rotors[0]
+    velocity = np.array([0.0, 0.0, -climb])
+    rate = plain_model.inflow_rate(ac, rotor, [], [], np.array([lambda0, 0, 0]), velocity, True)
+    v_t = lambda0 + climb / (rotor.speed * rotor.radius)
+    assert rate[0] == pytest.approx(-rotor.speed * 3 * np.pi / 8 * 2 * v_t * lambda0, rel=1e-6)
+
+
+def test_uniform_inflow_alone_is_glauerts():
+    """Without cyclic inflow the steady thrust is C_T = 2 lambda0 V_T at any advance ratio."""
+    ac, lambda0 = table6_aircraft(), 0.02
+    rotor = ac.rotors[1]
+    velocity = np.array([20.0, 5.0, -1.0])
+    rate = plain_model.inflow_rate(ac, rotor, [], [], np.array([lambda0, 0, 0]), velocity, False)
+    mu = velocity / (rotor.speed * rotor.radius)
+    v_t = np.sqrt(mu[0] ** 2 + mu[1] ** 2 + (lambda0 - mu[2]) ** 2)
+    assert rate[0] == pytest.approx(-rotor.speed * 3 * np.pi / 8 * 2 * v_t * lambda0, rel=1e-6)
+
+
 def test_inflow_moments_act_where_the_lift_is():
     """More lift aft raises lambdac, more on the advancing side lambdas."""
     ac = table6_aircraft()
@@ -636,6 +697,11 @@ def test_inflow_moments_act_where_the_lift_is():
         loads = [[(0.3, 10.0 * blade.n)]]
         rate = plain_model.inflow_rate(ac, rotor, [blade], loads, np.zeros(3), CALM, True)
         np.testing.assert_array_equal(np.sign(np.round(rate, 9)), [1, sign_s, sign_c])
+        # m_c = Int r dF_n cos psi / (rho pi R^3 (Omega R)^2), r from the axis.
+        r, tip_speed = rotor.hinge_offset + 0.3, rotor.speed * rotor.radius
+        moment = r * 10.0 / (1.225 * np.pi * rotor.radius**3 * tip_speed**2)
+        expected = rotor.speed * 45 * np.pi / 16 * moment * np.array([sign_s, sign_c])
+        np.testing.assert_allclose(rate[1:], expected, atol=1e-9)
 
 
 def test_inflow_is_finite_everywhere():

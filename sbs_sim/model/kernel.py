@@ -26,6 +26,9 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk."""
+    # numba names caches after the path of the source, and colcon's symlink install gives one file two paths
+    real = os.path.realpath(function.__code__.co_filename)
+    function.__code__ = function.__code__.replace(co_filename=real)
     with _cache_in(cache_folder()):
         return numba.njit(nogil=True, error_model="numpy", fastmath=FASTMATH, cache=True)(function)
 

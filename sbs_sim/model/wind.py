@@ -81,15 +81,19 @@ class Wind:
         """Check every field."""
         for name in ("velocity", "gust", "turbulence_intensity"):
             least = 0.0 if name == "turbulence_intensity" else -LARGEST_WIND
-            for axis, value in zip("xyz", getattr(self, name), strict=True):
+            values = getattr(self, name)
+            if np.shape(values) != (3,):
+                raise SimulationError(f"{name} = {values}: allowed are 3 values, north, east, down [m/s]")
+            for axis, value in zip("xyz", values, strict=True):
                 _check(f"{name}.{axis}", value, least, LARGEST_WIND, "m/s")
         _check("gust_delay", self.gust_delay, 0.0, 1e6, "s")
         _check("gust_duration", self.gust_duration, 0.0, 1e6, "s")
         _check("turbulence_length", self.turbulence_length, 0.1, 1e4, "m")
         _check("turbulence_airspeed", self.turbulence_airspeed, 0.1, LARGEST_WIND, "m/s")
         _check("turbulence_direction", self.turbulence_direction, -10.0, 10.0, "rad")
-        if not 0 <= self.turbulence_seed < 2**64:
-            raise SimulationError(f"turbulence_seed = {self.turbulence_seed}: allowed are 0 to 2^64 - 1")
+        seed = self.turbulence_seed
+        if not (isinstance(seed, (int, np.integer)) and 0 <= seed < 2**64):
+            raise SimulationError(f"turbulence_seed = {seed}: allowed are whole numbers from 0 to 2^64 - 1")
 
 
 def _check(name: str, value: float, least: float, most: float, unit: str) -> None:
@@ -150,7 +154,7 @@ class DrydenTurbulence:
         # States of 1/(1 + T s) and 1/(1 + T s)^2 in units of time T: z1' = -z1 + n, z2' = -z2 + z1.
         self._step = self._decay * np.array([[1.0, 0.0], [ratio, 1.0]])
         stationary = np.array([[0.5, 0.25], [0.25, 0.25]])
-        self._noise = np.linalg.cholesky(stationary - self._step @ stationary @ self._step.T)
+        self._noise = _noise_of_step(ratio)
         # the field is already there when the flight begins: start from its stationary distribution
         self._states = np.linalg.cholesky(stationary) @ self._random.standard_normal((2, 2))
         self._longitudinal = math.sqrt(0.5) * self._random.standard_normal()
@@ -168,3 +172,17 @@ class DrydenTurbulence:
         across = math.sqrt(3.0) * self._states[0] + (1.0 - math.sqrt(3.0)) * self._states[1]
         filtered = np.array([math.sqrt(2.0) * self._longitudinal, across[0], across[1]])
         return self._to_ned @ (self._sigma * filtered)
+
+
+def _noise_of_step(ratio: float) -> Array:
+    """Cholesky factor, shape (2, 2), of the covariance that noise adds to z1, z2 in a step of length `ratio`.
+
+    That is the integral of exp(-2 s) (1, s; s, s^2) over the step. For a short step the last diagonal element is
+    lost in rounding; zero stands for it then.
+    """
+    decay = math.exp(-2.0 * ratio)
+    first = -math.expm1(-2.0 * ratio) / 2.0
+    mixed = (1.0 - decay * (1.0 + 2.0 * ratio)) / 4.0
+    second = (1.0 - decay * (1.0 + 2.0 * ratio + 2.0 * ratio**2)) / 4.0
+    rest = max(0.0, second - mixed**2 / first)
+    return np.array([[math.sqrt(first), 0.0], [mixed / math.sqrt(first), math.sqrt(rest)]])

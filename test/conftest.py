@@ -1,0 +1,35 @@
+"""Fixtures of the physics tests: the aircraft that come with the package and their hovers."""
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def sbs():
+    """The aircraft to fly."""
+    from sbs_sim import Aircraft
+
+    return Aircraft.load("sbs")
+
+
+@pytest.fixture(scope="session")
+def sbs_paper():
+    """The aircraft in the paper's reading."""
+    from sbs_sim import Aircraft
+
+    return Aircraft.load("sbs_paper")
+
+
+@pytest.fixture(scope="session")
+def hover(sbs):
+    """Hover trim of `sbs`."""
+    from sbs_sim import trim
+
+    return trim(sbs)
+
+
+@pytest.fixture(scope="session")
+def paper_hover(sbs_paper):
+    """Hover trim of `sbs_paper`."""
+    from sbs_sim import trim
+
+    return trim(sbs_paper)

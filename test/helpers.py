@@ -1,0 +1,249 @@
+"""Aircraft to test with, and the compiled model wrapped so that a test reads like its statement."""
+
+import copy
+import functools
+
+import numpy as np
+
+from sbs_sim.aircraft import Aircraft, config_folder
+from sbs_sim.model import params as P
+from sbs_sim.model import state as S
+from sbs_sim.model import wind as W
+from sbs_sim.model.average import averaged_derivative
+from sbs_sim.model.dynamics import derivative
+from sbs_sim.model.integrate import RK4, advance
+
+CALM = np.zeros(3)
+VACUUM = {"air_density": 0.0}
+WEIGHTLESS_VACUUM = {"air_density": 0.0, "gravity": 0.0}
+POLAR = np.array([1.0, -1.0, 1.0])  # image of a polar vector in the plane y = 0
+AXIAL = -POLAR  # and of an axial one
+
+# So heavy that no rotor moves it: an acceleration of 1e-4 m/s^2 at the loads of this one. Neither gravity nor drag.
+TEST_STAND = {
+    "mass": 1e6,
+    "inertia": [[1e6, 0.0, 0.0], [0.0, 1e6, 0.0], [0.0, 0.0, 1e6]],
+    "flat_plate_areas": [0.0, 0.0, 0.0],
+}
+
+
+@functools.cache
+def _aircraft_file(name):
+    from ruamel.yaml import YAML
+
+    return YAML(typ="safe", pure=True).load((config_folder() / "aircraft" / f"{name}.yaml").read_text())
+
+
+def aircraft_data(name="sbs", *, environment=None, body=None, options=None, every_rotor=None, rotors=None):
+    """Return the mapping of an aircraft file with changes.
+
+    Parameters
+    ----------
+    name : str
+        A file of config/aircraft.
+    environment, body, options : dict, optional
+        Values to change.
+    every_rotor : dict, optional
+        Values to change in all rotors.
+    rotors : list of dict, optional
+        Changes rotor by rotor; as many rotors as the list has entries, those beyond the file's two like the second.
+    """
+    data = copy.deepcopy(_aircraft_file(name))
+    for part, changes in (("environment", environment), ("body", body), ("options", options)):
+        data[part].update(changes or {})
+    entries = data["rotors"] if rotors is None else [data["rotors"][min(i, 1)] for i in range(len(rotors))]
+    data["rotors"] = [
+        {**copy.deepcopy(entry), "name": f"R{i + 1}", **(every_rotor or {}), **(changes or {})}
+        for i, (entry, changes) in enumerate(zip(entries, rotors or [{}] * len(entries), strict=True))
+    ]
+    return data
+
+
+def build(name="sbs", folder=None, **changes):
+    """Return the `Aircraft` of `aircraft_data(name, **changes)`; airfoils are looked for in `folder` too."""
+    return Aircraft.from_dict(aircraft_data(name, **changes), folder)
+
+
+def unit(*components):
+    """Return a list of components with a norm of one."""
+    return (np.array(components) / np.linalg.norm(components)).tolist()
+
+
+def write_airfoil(path, cl, cd, step_deg=1.0, reynolds=(1e4, 1e6)):
+    """Write an airfoil table without influence of the Reynolds number; cl and cd are functions of alpha [rad]."""
+    degrees = np.linspace(-180.0, 180.0, round(360 / step_deg) + 1)
+    rows = ["reynolds,alpha_deg,cl,cd"]
+    for re in reynolds:
+        for angle in degrees:
+            # the same values at both ends, as the format demands
+            alpha = np.radians(-180.0 if angle == 180.0 else angle)
+            rows.append(f"{re},{angle:.10g},{float(cl(alpha))!r},{float(cd(alpha))!r}")
+    path.write_text("\n".join(rows) + "\n")
+    return str(path)
+
+
+def linear_airfoil(path, slope=5.73, drag=0.01, linear_deg=60.0):
+    """Write a table whose lift is exactly linear up to 60 deg and whose drag is constant: no kinks in use."""
+    end = np.radians(linear_deg)
+
+    def cl(alpha):
+        size = abs(alpha)
+        value = slope * (size if size <= end else end * (np.pi - size) / (np.pi - end))
+        return np.sign(alpha) * value if size < np.pi else 0.0
+
+    return write_airfoil(path, cl, lambda alpha: drag, step_deg=2.0)
+
+
+class Model:
+    """The compiled model of an aircraft: its derivative, averages and flights as plain calls."""
+
+    def __init__(self, aircraft, lead_lag=True, cyclic_inflow=True):
+        self.aircraft, self.layout = aircraft, aircraft.layout
+        self.lead_lag, self.cyclic_inflow = lead_lag, cyclic_inflow
+        self.params = aircraft.params(lead_lag, cyclic_inflow)
+        self.work = P.make_work(self.params)
+        self.speeds = np.array([rotor.speed for rotor in aircraft.rotors])
+
+    @property
+    def no_swash(self):
+        """Swashplates at zero, shape (n_rotors, 3)."""
+        return np.zeros((len(self.speeds), 3))
+
+    def state(self, velocity=(0.0, 0.0, 0.0), rates=(0.0, 0.0, 0.0), lambda0=0.0):
+        """Return a level state with undeflected blades."""
+        x = np.zeros(self.layout.size)
+        x[S.ATTITUDE] = 1.0
+        x[S.VELOCITY : S.RATES], x[S.RATES : S.BODY_SIZE] = velocity, rates
+        for j in range(len(self.speeds)):
+            x[self.layout.inflow(j).start] = lambda0
+        return x
+
+    def derivative(self, x, swash=None, psi=None, wind=CALM):
+        """Return the derivative of a state, shape (size,); the loads are left in `self.work.loads`."""
+        dx = np.empty(self.layout.size)
+        derivative(
+            self.params,
+            np.array(x, dtype=float),
+            self.no_swash if swash is None else np.array(swash, dtype=float),
+            np.zeros(len(self.speeds)) if psi is None else np.array(psi, dtype=float),
+            np.array(wind, dtype=float),
+            self.work,
+            dx,
+        )
+        return dx
+
+    def averaged(self, x, swash=None, azimuth_count=12):
+        """Return the averaged derivative, shape (size,), and the averaged loads, shape (n_rotors, LOAD_SIZE)."""
+        dx, loads = np.empty(self.layout.size), np.empty((len(self.speeds), P.LOAD_SIZE))
+        swash = self.no_swash if swash is None else np.array(swash, dtype=float)
+        averaged_derivative(
+            self.params, np.array(x, dtype=float), swash, azimuth_count, np.zeros(3), self.work, dx, loads
+        )
+        return dx, loads
+
+    def fly(self, x, steps, h, swash=None, psi0=None, first_step=0, method=RK4, wind=CALM):
+        """Return the state after steps of length h [s], whatever becomes of it."""
+        x = np.array(x, dtype=float)
+        air = np.zeros(W.WIND_SIZE)
+        air[W.STEADY : W.STEADY + 3] = wind
+        done, _ = advance(
+            self.params,
+            x,
+            self.no_swash if swash is None else np.array(swash, dtype=float),
+            np.zeros(len(self.speeds)) if psi0 is None else np.array(psi0, dtype=float),
+            first_step,
+            steps,
+            h,
+            air,
+            method,
+            np.full(self.layout.size, np.inf),
+            self.work,
+        )
+        assert done == steps
+        return x
+
+    def azimuth(self, steps, h, psi0=0.0):
+        """Return the azimuths of all rotors after steps of length h [s], shape (n_rotors,)."""
+        return psi0 + self.speeds * h * steps
+
+    def jacobian(self, x, swash=None, azimuth_count=12, rows=slice(None), columns=None, step=1e-6):
+        """Return rows and columns of the averaged derivative's derivative by the simulation state."""
+        columns = range(self.layout.size) if columns is None else columns
+        result = []
+        for i in columns:
+            difference = 0.0
+            for sign in (1, -1):
+                moved = np.array(x, dtype=float)
+                moved[i] += sign * step
+                difference = difference + sign * self.averaged(moved, swash, azimuth_count)[0]
+            result.append(difference[rows] / (2 * step))
+        return np.stack(result, axis=1)
+
+    def rotor_places(self):
+        """Return the places of the rotor states that are in use, and of the equations that settle them."""
+        index, places, equations = np.arange(self.layout.size), [], []
+        for j in range(len(self.speeds)):
+            places += list(index[self.layout.flap(j)])
+            equations += list(index[self.layout.flap_rate(j)])
+            if self.lead_lag:
+                places += list(index[self.layout.lag(j)])
+                equations += list(index[self.layout.lag_rate(j)])
+            inflow = list(index[self.layout.inflow(j)])[: 3 if self.cyclic_inflow else 1]
+            places += inflow
+            equations += inflow
+        return places, equations
+
+    def settle(self, x, swash=None, azimuth_count=12):
+        """Return the state with the rotors in equilibrium while the body keeps its motion (Newton)."""
+        x = np.array(x, dtype=float)
+        places, equations = self.rotor_places()
+        for _ in range(30):
+            slope = self.averaged(x, swash, azimuth_count)[0][equations]
+            matrix = self.jacobian(x, swash, azimuth_count, equations, places)
+            step = np.linalg.solve(matrix, slope)
+            x[places] -= step
+            if np.abs(step).max() < 1e-12:
+                return x
+        raise AssertionError(f"the rotors did not settle: last step {np.abs(step).max():.3g}")
+
+
+def mirrored_data(data):
+    """Return the mapping of the aircraft's image in the plane y = 0."""
+    image = copy.deepcopy(data)
+    image["body"]["inertia"] = (np.outer(POLAR, POLAR) * np.array(data["body"]["inertia"])).tolist()
+    for rotor in image["rotors"]:
+        rotor["hub"] = (POLAR * rotor["hub"]).tolist()
+        rotor["shaft_direction"] = (POLAR * rotor["shaft_direction"]).tolist()
+        rotor["rotation"] = -rotor["rotation"]
+    return image
+
+
+def mirrored_state(x):
+    """Return the image of a state; a rotor's own coordinates follow its advancing side and stay as they are."""
+    image = np.array(x, dtype=float)
+    image[S.POSITION : S.ATTITUDE] *= POLAR
+    image[S.ATTITUDE + 1 : S.VELOCITY] *= AXIAL
+    image[S.VELOCITY : S.RATES] *= POLAR
+    image[S.RATES : S.BODY_SIZE] *= AXIAL
+    return image
+
+
+def mirrored_swash(swash):
+    """Return the image of swashplate angles: left and right cyclic change sides."""
+    return np.array(swash) * [1.0, -1.0, 1.0]
+
+
+def turned_state(x, heading):
+    """Return the state turned about the vertical by a heading [rad], about the origin."""
+    c, s = np.cos(heading / 2), np.sin(heading / 2)
+    w, i, j, k = x[S.ATTITUDE : S.VELOCITY]
+    turned = np.array(x, dtype=float)
+    turned[S.ATTITUDE : S.VELOCITY] = [c * w - s * k, c * i - s * j, c * j + s * i, c * k + s * w]
+    turned[S.POSITION : S.ATTITUDE] = heading_matrix(heading) @ x[S.POSITION : S.ATTITUDE]
+    return turned
+
+
+def heading_matrix(heading):
+    """Return the rotation by a heading [rad] about down, shape (3, 3)."""
+    c, s = np.cos(heading), np.sin(heading)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -1,0 +1,188 @@
+"""Real processes and a real DDS participant for the tests of the nodes; everything stays on loopback."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+
+from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
+from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
+
+EXECUTABLES = Path(__file__).resolve().parent.parent / "install" / "sbs_sim" / "lib" / "sbs_sim"
+PATIENCE = 30.0  # s of wall time; generous, for machines that are busy
+
+
+def environment(domain: int) -> dict[str, str]:
+    """Environment of a process in a DDS domain of its own on this machine."""
+    return {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+class Process:
+    """A running executable with its output in a file."""
+
+    def __init__(self, name: str, domain: int, folder: Path, parameters: dict[str, Any], remaps: list[str]) -> None:
+        self.log = folder / f"{name}-{time.monotonic_ns()}.log"
+        command = [sys.executable, str(EXECUTABLES / name), "--ros-args"]
+        for key, value in parameters.items():
+            command += ["-p", f"{key}:={value}"]
+        for remap in remaps:
+            command += ["-r", remap]
+        with self.log.open("w") as out:
+            self._popen = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT, env=environment(domain))
+        self.pid = self._popen.pid
+
+    @property
+    def output(self) -> str:
+        """What it has printed so far."""
+        return self.log.read_text()
+
+    @property
+    def running(self) -> bool:
+        """True while it has not ended."""
+        return self._popen.poll() is None
+
+    def wait(self) -> int:
+        """Exit code, once it has ended."""
+        return self._popen.wait(PATIENCE)
+
+    def interrupt(self, number: int = signal.SIGINT) -> int:
+        """Ctrl-C; the exit code."""
+        self._popen.send_signal(number)
+        return self.wait()
+
+    def kill(self) -> None:
+        """End it whatever it does."""
+        if self.running:
+            self._popen.kill()
+            self._popen.wait(PATIENCE)
+
+
+class Client:
+    """A node of the test: keeps the messages of every topic that it is asked to watch."""
+
+    def __init__(self, domain: int) -> None:
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context, domain_id=domain)
+        self.node = Node("test_client", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self.messages: dict[str, list[Any]] = {}
+        self._publishers: dict[str, Any] = {}
+
+    def watch(self, topic: str, kind: type) -> list[Any]:
+        """List that fills with the messages of a topic."""
+        kept = self.messages.setdefault(topic, [])
+        self.node.create_subscription(kind, topic, kept.append, QoSProfile(depth=1000))
+        return kept
+
+    def spin(self, seconds: float) -> None:
+        """Receive for a while of wall time."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def until(self, condition: Callable[[], Any], what: str) -> Any:
+        """Receive until a condition holds, and return its value."""
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            if value := condition():
+                return value
+            self._executor.spin_once(timeout_sec=0.05)
+        raise AssertionError(f"waited {PATIENCE:g} s in vain for {what}")
+
+    def next(self, topic: str, condition: Callable[[Any], Any] = lambda _: True) -> Any:
+        """First message of a watched topic that arrives from now on and meets a condition."""
+        kept = self.messages[topic]
+        seen = len(kept)
+
+        def found() -> Any:
+            nonlocal seen
+            while seen < len(kept):
+                seen += 1
+                if condition(kept[seen - 1]):
+                    return kept[seen - 1]
+            return None
+
+        return self.until(found, f"a message on {topic}")
+
+    def call(self, kind: type, name: str, **request: Any) -> Any:
+        """Response of a service."""
+        client = self.node.create_client(kind, name)
+        self.until(client.service_is_ready, f"service {name}")
+        future = client.call_async(kind.Request(**request))
+        self.until(future.done, f"an answer of {name}")
+        self.node.destroy_client(client)
+        return future.result()
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish, once somebody listens."""
+        if topic not in self._publishers:
+            publisher = self.node.create_publisher(type(message), topic, QoSProfile(depth=1))
+            self._publishers[topic] = publisher
+            self.until(publisher.get_subscription_count, f"a subscriber of {topic}")
+        self._publishers[topic].publish(message)
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+
+class World:
+    """A DDS domain with processes and one client."""
+
+    def __init__(self, domain: int, folder: Path) -> None:
+        self.domain, self.folder = domain, folder
+        self.client = Client(domain)
+        self.processes: list[Process] = []
+
+    def start(self, name: str, remaps: list[str] | None = None, **parameters: Any) -> Process:
+        """Start an executable with parameters."""
+        process = Process(name, self.domain, self.folder, parameters, remaps or [])
+        self.processes.append(process)
+        return process
+
+    def set_parameter(self, node: str, name: str, value: Any) -> Any:
+        """Set a parameter of a node; its SetParametersResult."""
+        from rcl_interfaces.srv import SetParameters
+
+        parameter = Parameter(name, value=value).to_parameter_msg()
+        return self.client.call(SetParameters, f"{node}/set_parameters", parameters=[parameter]).results[0]
+
+
+@contextlib.contextmanager
+def world(domain: int, folder: Path) -> Iterator[World]:
+    """A world whose processes end with it."""
+    made = World(domain, folder)
+    try:
+        yield made
+    finally:
+        for process in made.processes:
+            process.kill()
+        made.client.close()
+
+
+def controls_message(values: Any) -> Controls:
+    """Message of pilot controls [rad], shape (4,)."""
+    return Controls(**{name: float(value) for name, value in zip(CONTROL_NAMES, values, strict=True)})
+
+
+def swashplate_message(rows: Any) -> SwashplateArray:
+    """Message of swashplate angles [rad], shape (n_rotors, 3)."""
+    return SwashplateArray(
+        rotors=[
+            Swashplate(**{name: float(value) for name, value in zip(SWASHPLATE_NAMES, row, strict=True)}) for row in rows
+        ]
+    )

@@ -1,0 +1,429 @@
+"""The nodes as a user meets them: real processes, real DDS on loopback."""
+
+import itertools
+import math
+import os
+import signal
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy")
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
+from geometry_msgs.msg import Point, Vector3  # noqa: E402
+from nav_msgs.msg import Odometry  # noqa: E402
+from ros_harness import controls_message, swashplate_message, world  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
+from scipy.spatial.transform import Rotation  # noqa: E402
+from std_srvs.srv import SetBool  # noqa: E402
+
+from sbs_msgs.msg import (  # noqa: E402
+    BodyState,
+    Controls,
+    InflowArray,
+    RotorStateArray,
+    SimulationStatus,
+    SwashplateArray,
+)
+from sbs_msgs.srv import Reset, SetWind, Step  # noqa: E402
+from sbs_sim import Aircraft, trim  # noqa: E402
+
+DOMAINS = itertools.cycle(1 + (os.getpid() + i) % 100 for i in range(100))
+TOPICS = {
+    "state": BodyState,
+    "rotors": RotorStateArray,
+    "inflow": InflowArray,
+    "odom": Odometry,
+    "/clock": Clock,
+    "status": SimulationStatus,
+    "diagnostics": DiagnosticArray,
+    "swashplate": SwashplateArray,
+}
+DEGREE = math.radians(1.0)
+
+
+@pytest.fixture(scope="module")
+def hover():
+    return trim(Aircraft.load("sbs"))
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    """A simulator with its mixer, in flight, and a client that watches every topic."""
+    with world(next(DOMAINS), tmp_path_factory.mktemp("flight")) as made:
+        for topic, kind in TOPICS.items():
+            made.client.watch(topic, kind)
+        made.simulator = made.start("simulator")
+        made.client.next("state")
+        yield made
+
+
+@pytest.fixture
+def client(flight):
+    """The client, with the aircraft playing in trimmed hover at the origin."""
+    assert flight.client.call(SetWind, "set_wind").success
+    assert flight.client.call(Reset, "reset").success
+    assert flight.client.call(SetBool, "pause", data=False).success
+    flight.client.next("state")
+    return flight.client
+
+
+@pytest.fixture
+def own_world(tmp_path):
+    with world(next(DOMAINS), tmp_path) as made:
+        yield made
+
+
+def vector(message):
+    return np.array([message.x, message.y, message.z])
+
+
+def body_rates(state):
+    return vector(state.angular_velocity)
+
+
+def stamp(message):
+    return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+
+
+def status_of(array, name):
+    return next((status for status in array.status if status.name == name), None)
+
+
+# --- in flight --------------------------------------------------------------------------------------------------
+
+
+def test_hovers_and_publishes_everything(client):
+    messages = {topic: client.next(topic) for topic in TOPICS if topic != "swashplate"}
+    state, rotors = messages["state"], messages["rotors"]
+    assert state.header.frame_id == "ned"
+    np.testing.assert_allclose(vector(state.velocity), 0.0, atol=1e-6)
+    np.testing.assert_allclose(vector(state.acceleration), 0.0, atol=1e-6)
+    weight = 20.62 * 9.80665
+    assert sum(rotor.thrust for rotor in rotors.rotors) == pytest.approx(weight, rel=1e-3)
+    assert len(rotors.rotors) == 2
+    for rotor in rotors.rotors:
+        assert rotor.speed == pytest.approx(2400 * math.pi / 30)
+        assert rotor.power == pytest.approx(rotor.torque * rotor.speed)
+        assert 0 <= rotor.azimuth < 2 * math.pi
+        for name in ("flap", "flap_rate", "lag", "lag_rate", "blade_flap", "blade_lag"):
+            assert len(getattr(rotor, name)) == 3
+        # the blades of a hovering rotor all cone alike, and lag behind their hinges under drag
+        np.testing.assert_allclose(rotor.blade_flap, rotor.flap[0], atol=1e-6)
+        assert rotor.flap[0] > 0
+        assert rotor.lag[0] > 0
+        # the rotor hangs the aircraft: the hub force is thrust minus the blades' weight, upwards
+        assert rotor.hub.force.z == pytest.approx(-rotor.thrust + 3 * 0.1613 * 9.80665, rel=1e-3)
+    for inflow in messages["inflow"].rotors:
+        # momentum theory: lambda0 = sqrt(C_T / 2)
+        thrust_coefficient = weight / 2 / (1.225 * math.pi * 0.505**2 * (251.327 * 0.505) ** 2)
+        assert inflow.uniform == pytest.approx(math.sqrt(thrust_coefficient / 2), rel=1e-3)
+    assert messages["status"].state == SimulationStatus.PLAYING
+    assert messages["status"].fault == ""
+    client.next("diagnostics", lambda m: (s := status_of(m, "simulator")) and s.level == DiagnosticStatus.OK)
+    client.next("diagnostics", lambda m: status_of(m, "control_mixer"))
+
+
+def test_every_tick_is_published_once_with_its_time(client):
+    client.next("state")
+    first = len(client.messages["state"])
+    client.spin(1.0)
+    times = [stamp(message) for message in client.messages["state"][first:]]
+    assert len(times) > 10
+    np.testing.assert_allclose(np.diff(times), 0.01, atol=2e-9)
+
+
+def test_odom_is_the_same_motion_in_ros_axes(client):
+    request = {"airspeed": 8.0, "heading": 0.7, "position": Point(x=3.0, y=5.0, z=-20.0), "turn_rate": 0.2}
+    assert client.call(Reset, "reset", **request).success
+    state = client.next("state", lambda m: m.position.z < -19)
+    odom = client.next("odom", lambda m: stamp(m) >= stamp(state))
+    state = next(m for m in client.messages["state"] if stamp(m) == stamp(odom))
+    assert (odom.header.frame_id, odom.child_frame_id) == ("odom", "base_link")
+    to_enu = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])  # north east down to east north up
+    to_flu = np.diag([1.0, -1, -1])
+    q = state.attitude
+    ned_frd = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
+    q = odom.pose.pose.orientation
+    enu_flu = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
+    np.testing.assert_allclose(enu_flu, to_enu @ ned_frd @ to_flu, atol=1e-12)
+    np.testing.assert_allclose(vector(odom.pose.pose.position), to_enu @ vector(state.position), atol=1e-12)
+    np.testing.assert_allclose(vector(odom.twist.twist.linear), to_flu @ vector(state.velocity), atol=1e-12)
+    np.testing.assert_allclose(vector(odom.twist.twist.angular), to_flu @ body_rates(state), atol=1e-12)
+    # 8 m/s on heading 0.7: north and east, as told
+    np.testing.assert_allclose((ned_frd @ vector(state.velocity))[2], 0.0, atol=0.05)
+
+
+# Signs from the definitions, not from a run. Collective: up is -z. Longitudinal cyclic: positive is push, nose down and
+# forward (paper, section 2.2). Lateral cyclic: pitch falls by A1s G cos(psi + phase), so with the rigging of sbs.yaml
+# (phase near -72 deg) the outer side of the right rotor and the inner side of the left one lose lift: roll to the right.
+# Differential: the right rotor tilts forward, the left one back: the nose goes left.
+@pytest.mark.parametrize(
+    ("control", "read", "sign"),
+    [
+        (0, lambda m: m.velocity.z, -1),
+        (1, lambda m: m.angular_velocity.x, +1),
+        (2, lambda m: m.angular_velocity.y, -1),
+        (3, lambda m: m.angular_velocity.z, -1),
+    ],
+)
+def test_a_step_of_each_control_moves_its_axis(client, hover, control, read, sign):
+    wanted = hover.controls.copy()
+    wanted[control] += DEGREE
+    client.publish("controls", controls_message(wanted))
+    begin = stamp(client.next("state"))
+    state = client.next("state", lambda m: stamp(m) > begin + 0.3)
+    values = np.array([state.velocity.z, *body_rates(state)])
+    assert sign * read(state) > 0.02
+    assert np.argmax(np.abs(values)) == control
+
+
+def test_pause_step_and_play(client):
+    assert client.call(SetBool, "pause", data=True).success
+    paused = client.next("status", lambda m: m.state == SimulationStatus.PAUSED)
+    answer = client.call(Step, "step", ticks=7)
+    assert answer.success
+    assert answer.sim_time == pytest.approx(paused.sim_time + 0.07, abs=1e-9)
+    client.next("state", lambda m: stamp(m) == pytest.approx(answer.sim_time, abs=2e-9))
+    assert not client.call(Step, "step", ticks=0).success
+    assert client.next("status").sim_time == pytest.approx(answer.sim_time)
+    assert client.call(SetBool, "pause", data=False).success
+    client.next("state", lambda m: stamp(m) > answer.sim_time + 0.05)
+    refused = client.call(Step, "step", ticks=1)
+    assert not refused.success
+    assert "paused" in refused.message
+
+
+def test_reset_to_a_condition_and_to_a_state(client):
+    assert client.call(Reset, "reset", airspeed=12.0, climb_rate=1.0).success
+    state = client.next("state", lambda m: m.velocity.x > 10)
+    assert np.linalg.norm(vector(state.velocity)) == pytest.approx(math.hypot(12, 1), abs=0.05)
+    layout = Aircraft.load("sbs").layout
+    values = np.zeros(layout.size)
+    values[:13] = [1, 2, -30, 2, 0, 0, 0, 0.5, 0, 0, 0, 0, 0]  # a quaternion of norm 2 is normalised
+    assert client.call(Reset, "reset", from_state=True, state=values.tolist()).success
+    state = client.next("state", lambda m: m.position.z < -29)
+    assert state.attitude.w == pytest.approx(1.0, abs=1e-3)
+
+
+def test_wind_moves_the_aircraft_and_a_gust_passes(client):
+    assert client.call(SetWind, "set_wind", gust=Vector3(z=-4.0), gust_duration=0.5).success
+    begin = stamp(client.next("state"))
+    risen = client.next("state", lambda m: stamp(m) > begin + 0.6)
+    assert risen.velocity.z < -0.1  # air that goes up takes the aircraft along
+    answer = client.call(SetWind, "set_wind", velocity=Vector3(x=5.0), turbulence_intensity=Vector3(x=1.0, y=1.0, z=0.5))
+    assert answer.success
+    begin = stamp(client.next("state"))
+    state = client.next("state", lambda m: stamp(m) > begin + 1.0)
+    assert state.velocity.x > 0.05
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "request_fields", "said"),
+    [
+        ("reset", Reset, {"airspeed": math.nan}, "airspeed = nan"),
+        ("reset", Reset, {"airspeed": 1e9}, "airspeed = 1000000000.0: allowed are -100 to 100 m/s"),
+        ("reset", Reset, {"airspeed": 95.0}, "no trim"),
+        ("reset", Reset, {"heading": math.inf}, "heading"),
+        ("reset", Reset, {"position": Point(x=math.nan)}, "north = nan"),
+        ("reset", Reset, {"from_state": True, "state": [0.0] * 3}, "3 values"),
+        ("reset", Reset, {"from_state": True, "state": [0.0] * 43}, "attitude has a norm of 0"),
+        ("reset", Reset, {"from_state": True, "state": [0.0, 0, 0, 1] + [0.0] * 5 + [math.nan] + [0.0] * 33}, "w = nan"),
+        ("set_wind", SetWind, {"velocity": Vector3(x=math.nan)}, "velocity.x = nan"),
+        ("set_wind", SetWind, {"velocity": Vector3(y=500.0)}, "velocity.y = 500.0: allowed are -100 to 100 m/s"),
+        ("set_wind", SetWind, {"gust_duration": -1.0}, "gust_duration = -1.0"),
+        ("set_wind", SetWind, {"turbulence_intensity": Vector3(z=-1.0)}, "turbulence_intensity.z = -1.0"),
+        ("step", Step, {"ticks": 4294967295}, "ticks = 4294967295: allowed are 1 to"),
+    ],
+)
+def test_bad_requests_are_refused_and_change_nothing(client, name, kind, request_fields, said):
+    answer = client.call(kind, name, **request_fields)
+    assert not answer.success
+    assert said in answer.message
+    assert "\n" not in answer.message
+    state = client.next("state")
+    np.testing.assert_allclose(vector(state.velocity), 0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("topic", "message", "node"),
+    [
+        ("controls", controls_message([math.nan, 0, 0, 0]), "control_mixer"),
+        ("controls", controls_message([0.1, math.inf, 0, 0]), "control_mixer"),
+        ("controls", controls_message([0.1, 0, 1e6, 0]), "control_mixer"),
+        ("swashplate", swashplate_message([[math.nan, 0, 0]] * 2), "simulator"),
+        ("swashplate", swashplate_message([[0.1, 0, 0]] * 3), "simulator"),
+        ("swashplate", swashplate_message([[0.1, 2.0, 0]] * 2), "simulator"),
+        ("swashplate", swashplate_message([]), "simulator"),
+    ],
+)
+def test_bad_commands_are_refused_and_change_nothing(client, topic, message, node):
+    def rejected(array):
+        status = status_of(array, node)
+        return status and next(int(v.value) for v in status.values if v.key == "rejected_messages")
+
+    before = rejected(client.next("diagnostics", lambda m: status_of(m, node)))
+    client.publish(topic, message)
+    client.next("diagnostics", lambda m: (rejected(m) or 0) > before)
+    np.testing.assert_allclose(vector(client.next("state").velocity), 0.0, atol=1e-3)
+
+
+def test_an_old_command_is_held_and_reported(flight, client, hover):
+    def warned(array):
+        status = status_of(array, "simulator")
+        return status and status.level == DiagnosticStatus.WARN and "timed out" in status.message
+
+    climb = hover.controls + [DEGREE, 0, 0, 0]
+    client.publish("controls", controls_message(climb))
+    client.next("diagnostics", warned)
+    assert "holding the last one" in flight.simulator.output
+    climbing = client.next("state")
+    assert client.next("state", lambda m: stamp(m) > stamp(climbing) + 0.2).velocity.z < -0.1
+    client.publish("controls", controls_message(climb))
+    client.next("diagnostics", lambda m: (s := status_of(m, "simulator")) and not warned(m) and s)
+
+
+def test_the_mixer_clips_says_so_once_and_follows_the_paper(flight, client):
+    for _ in range(3):
+        client.publish("controls", controls_message([1.0, 0.0, 0.02, 0.01]))
+        client.spin(0.05)
+    array = client.next("diagnostics", lambda m: (s := status_of(m, "control_mixer")) and s.level)
+    assert "collective at its limit of 20 deg" in status_of(array, "control_mixer").message
+    assert flight.simulator.output.count("clipped: collective at its limit of 20 deg") == 1
+    # section 2.1.1: B1s(1) = B1s - dB1s, B1s(2) = B1s + dB1s; the actuators need a moment to get there
+    moved = client.next("swashplate", lambda m: m.rotors[1].longitudinal_cyclic == pytest.approx(0.03))
+    assert moved.rotors[0].longitudinal_cyclic == pytest.approx(0.01)
+    assert moved.rotors[0].collective == pytest.approx(math.radians(20.0))
+
+
+def test_a_fault_pauses_and_a_reset_cures_it(flight, client):
+    values = np.zeros(43)
+    values[3], values[7] = 1.0, 349.9999  # at the edge of the plausible, and falling
+    values[9] = 349.9999
+    assert client.call(Reset, "reset", from_state=True, state=values.tolist()).success
+    faulty = client.next("status", lambda m: m.fault)
+    assert faulty.state == SimulationStatus.PAUSED
+    assert "step" in faulty.fault
+    assert " w to " in faulty.fault or " u to " in faulty.fault
+    assert np.isfinite(vector(client.messages["state"][-1].velocity)).all()
+    refused = client.call(SetBool, "pause", data=False)
+    assert not refused.success
+    assert "reset" in refused.message
+    assert client.call(Reset, "reset").success
+    assert client.call(SetBool, "pause", data=False).success
+    assert client.next("status", lambda m: m.state == SimulationStatus.PLAYING).fault == ""
+    assert flight.simulator.running
+
+
+def test_parameters_can_be_changed_in_flight_and_bad_ones_are_refused(flight, client):
+    assert flight.set_parameter("simulator", "real_time_factor", 0.5).successful
+    client.next("status", lambda m: 0.3 < m.real_time_factor < 0.7)
+    refused = flight.set_parameter("simulator", "real_time_factor", -1.0)
+    assert not refused.successful
+    assert not flight.set_parameter("simulator", "publish_rate", 50.0).successful  # fixed at the start
+    assert flight.set_parameter("simulator", "real_time_factor", 1.0).successful
+
+
+# --- processes of their own --------------------------------------------------------------------------------------
+
+
+def test_simulator_and_mixer_in_two_processes(own_world, hover):
+    simulator = own_world.start("simulator", components="[simulator]")
+    client = own_world.client
+    client.watch("state", BodyState)
+    client.next("state")
+    assert client.node.count_subscribers("controls") == 0
+    mixer = own_world.start("control_mixer", use_sim_time="true")
+    wanted = hover.controls + [DEGREE, 0, 0, 0]
+    client.publish("controls", controls_message(wanted))
+    client.next("state", lambda m: m.velocity.z < -0.1)
+    assert mixer.interrupt() == 0
+    assert simulator.running
+    assert simulator.interrupt() == 0
+
+
+def test_namespaces_and_remaps(own_world):
+    own_world.start("simulator", remaps=["__ns:=/left", "odom:=truth"])
+    client = own_world.client
+    client.watch("/left/state", BodyState)
+    client.watch("/left/truth", Odometry)
+    client.next("/left/state")
+    client.next("/left/truth")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("pace", [1.0, 0.0])
+def test_ends_cleanly(own_world, number, pace):
+    process = own_world.start("simulator", real_time_factor=pace)
+    own_world.client.watch("state", BodyState)
+    own_world.client.next("state")
+    assert process.interrupt(number) == 0
+    assert "Traceback" not in process.output
+    assert "Error" not in process.output
+
+
+def test_as_fast_as_possible_loses_no_tick(own_world):
+    own_world.start("simulator", real_time_factor=0.0)
+    client = own_world.client
+    states = client.watch("state", BodyState)
+    client.watch("status", SimulationStatus)
+    status = client.next("status", lambda m: m.sim_time > 5.0)
+    assert status.real_time_factor > 1.5
+    assert status.dropped_messages == 0
+    assert status.missed_deadlines == 0
+    assert len(states) > 10
+
+
+def test_starts_in_trimmed_forward_flight_with_wind(own_world):
+    own_world.start("simulator", airspeed=15.0, climb_rate=1.0, turn_rate=0.1, wind="[3.0, 0.0, 0.0]", altitude=50.0)
+    client = own_world.client
+    client.watch("state", BodyState)
+    state = client.next("state")
+    q = state.attitude
+    ground = Rotation.from_quat([q.x, q.y, q.z, q.w]).apply(vector(state.velocity))
+    air = ground - [3.0, 0.0, 0.0]
+    assert np.hypot(*air[:2]) == pytest.approx(15.0, abs=0.1)
+    assert -air[2] == pytest.approx(1.0, abs=0.1)
+    assert state.position.z < -49.0
+    assert np.linalg.norm(body_rates(state)) == pytest.approx(0.1, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"aircraft": "nothing"}, "aircraft = 'nothing': allowed are"),
+        ({"airspeed": "fast"}, "parameter airspeed = 'fast'"),
+        ({"airspeed": 1000.0}, "parameter airspeed = 1000.0: allowed are -100 to 100"),
+        ({"publish_rate": 0.0}, "parameter publish_rate = 0.0: allowed are 1 to 10000"),
+        ({"components": "[autopilot]"}, "parameter components"),
+        ({"wind": "[1.0, 2.0]"}, "parameter wind"),
+        ({"wind": "[1.0, 2.0, .nan]"}, "velocity.z = nan"),
+        ({"airspeed": 95.0}, "no trim"),
+    ],
+)
+def test_a_wrong_parameter_stops_the_node_with_one_line(own_world, parameters, said):
+    process = own_world.start("simulator", **parameters)
+    assert process.wait() == 1
+    lines = process.output.strip().splitlines()
+    assert len(lines) == 1, process.output
+    assert said in lines[0]
+
+
+def test_a_broken_aircraft_file_stops_either_node_with_one_line(own_world):
+    path = own_world.folder / "broken.yaml"
+    path.write_text("name: broken\nrotors: []\n")
+    for name in ("simulator", "control_mixer"):
+        process = own_world.start(name, aircraft=str(path))
+        assert process.wait() == 1
+        assert len(process.output.strip().splitlines()) == 1
+        assert "environment" in process.output
+
+
+def test_controls_message_names_the_pilot_controls():
+    assert Controls.get_fields_and_field_types().keys() - {"header"} == {
+        "collective",
+        "lateral_cyclic",
+        "longitudinal_cyclic",
+        "differential_longitudinal_cyclic",
+    }

@@ -274,9 +274,7 @@ class Aircraft:
         index, grid = _airfoil_grids(self, dict(zip(names, first_rows, strict=False)))
         air = self.environment
         return P.Params(
-            air=np.array(
-                [air.air_density, 1 / air.kinematic_viscosity, air.gravity, *self.body.flat_plate_areas]
-            ),
+            air=np.array([air.air_density, 1 / air.kinematic_viscosity, air.gravity, *self.body.flat_plate_areas]),
             body=np.array([mass, *first, *inertia.ravel(), self.body.mass]),
             switches=np.array(
                 [lead_lag, cyclic_inflow, complete, self.options.hub_moment == "complete"], dtype=np.int64
@@ -295,13 +293,20 @@ class Aircraft:
         row[P.SPEED], row[P.RADIUS], row[P.SENSE] = rotor.speed, rotor.radius, rotor.rotation
         row[P.HINGE], row[P.FLAP_HINGE] = rotor.hinge_offset, rotor.flap_hinge_offset
         row[P.LAG_HINGE] = rotor.hinge_offset - rotor.flap_hinge_offset
-        row[P.BLADE_MASS], row[P.S1], row[P.A1_HUB] = rotor.blade_mass, rotor.first_moment, rotor.second_moment
+        row[P.BLADE_MASS], row[P.S1], row[P.A1_HUB] = (
+            rotor.blade_mass,
+            rotor.first_moment,
+            rotor.second_moment,
+        )
         whole = self.options.flap_inertia == "axis_to_tip"
         row[P.A1] = rotor.blade_mass * rotor.radius**2 / 3 if whole else rotor.second_moment
         row[P.FLAP_SPRING], row[P.LAG_SPRING] = rotor.flap_spring, rotor.lag_spring
         row[P.LAG_DAMPING] = rotor.lag_damping
         row[P.PITCH_FLAP], row[P.PITCH_LAG] = rotor.pitch_flap_coupling, rotor.pitch_lag_coupling
-        row[P.COS_PHASE], row[P.SIN_PHASE] = math.cos(rotor.swashplate_phase), math.sin(rotor.swashplate_phase)
+        row[P.COS_PHASE], row[P.SIN_PHASE] = (
+            math.cos(rotor.swashplate_phase),
+            math.sin(rotor.swashplate_phase),
+        )
         row[P.DUCT] = rotor.duct_expansion
         row[P.HUB_X : P.HUB_Z + 1] = rotor.hub
         return row
@@ -432,7 +437,7 @@ def _rotor(entry: dict[str, Any]) -> Rotor:
             "twist_root": math.radians(twist["root"]),
             "twist_tip": math.radians(twist["tip"]),
             "mixing": _frozen(rows),
-        }  # type: ignore[arg-type]
+        }
     )
 
 

@@ -201,6 +201,11 @@ class FlightLoop:
         return self._simulation.swashplate
 
     @property
+    def time(self) -> float:
+        """Simulation time [s]."""
+        return self._simulation.time
+
+    @property
     def command_timeout(self) -> float:
         """Age at which a command counts as timed out [s]; 0 is never."""
         return self._timeout

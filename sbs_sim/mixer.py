@@ -82,7 +82,9 @@ class Mixer:
             self._angles = self._target.copy()
         else:
             reach = self._rates * max(0.0, time - self._time)
-            self._angles = self._angles + np.clip(self._followed - self._angles, -reach, reach)
+            gap = self._followed - self._angles
+            # where the target is in reach it is taken itself: a sum would miss it by rounding
+            self._angles = np.where(np.abs(gap) <= reach, self._followed, self._angles + np.sign(gap) * reach)
         self._followed = self._target
         self._time = time
         return self._angles.copy()

@@ -291,7 +291,14 @@ def trimmed_state(
     Returns
     -------
     ndarray, shape (size,)
+
+    Raises
+    ------
+    SimulationError
+        The heading is not finite or far from a turn; position and velocity are checked by `Simulation`.
     """
+    if not abs(heading) <= 4 * math.pi:  # true for a NaN as well
+        raise SimulationError(f"heading = {heading}: allowed are {-4 * math.pi:.6g} to {4 * math.pi:.6g} rad")
     state = aircraft.layout.from_linear(point.state, heading)
     state[: S.ATTITUDE] = position
     to_earth = rotation_matrix(euler_to_quaternion(heading, point.pitch, point.roll))

@@ -15,8 +15,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
-
 from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
+
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
 
 EXECUTABLES = Path(__file__).resolve().parent.parent / "install" / "sbs_sim" / "lib" / "sbs_sim"
@@ -133,6 +133,20 @@ class Client:
             self.until(publisher.get_subscription_count, f"a subscriber of {topic}")
         self._publishers[topic].publish(message)
 
+    def publish_until(self, topic: str, message: Any, watched: str, condition: Callable[[Any], Any]) -> Any:
+        """Publish like a pilot, again and again, until a message that meets a condition arrives."""
+        kept = self.messages[watched]
+        seen = len(kept)
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            self.publish(topic, message)
+            self.spin(0.02)
+            for found in kept[seen:]:
+                if condition(found):
+                    return found
+            seen = len(kept)
+        raise AssertionError(f"waited {PATIENCE:g} s in vain for a message on {watched}")
+
     def close(self) -> None:
         """Leave the domain."""
         self._executor.shutdown()
@@ -183,6 +197,7 @@ def swashplate_message(rows: Any) -> SwashplateArray:
     """Message of swashplate angles [rad], shape (n_rotors, 3)."""
     return SwashplateArray(
         rotors=[
-            Swashplate(**{name: float(value) for name, value in zip(SWASHPLATE_NAMES, row, strict=True)}) for row in rows
+            Swashplate(**{name: float(value) for name, value in zip(SWASHPLATE_NAMES, row, strict=True)})
+            for row in rows
         ]
     )

@@ -226,9 +226,7 @@ class _TrimProblem:
     def residual(self, condition: TrimCondition, unknowns: Array) -> Array:
         """Scaled residuals of the equations; the mean loads are left in `loads`."""
         x, swash = self.state(condition, unknowns)
-        averaged_derivative(
-            self._params, x, swash, self.azimuth_count, np.zeros(3), self._work, self._dx, self.loads
-        )
+        averaged_derivative(self._params, x, swash, self.azimuth_count, np.zeros(3), self._work, self._dx, self.loads)
         return self._dx[self._equations] / self._scales
 
     def jacobian(self, condition: TrimCondition, unknowns: Array, step: float = 1e-6) -> Array:
@@ -316,7 +314,7 @@ def _newton(problem: _TrimProblem, condition: TrimCondition, unknowns: Array) ->
         if size < TOLERANCE:
             return unknowns, iteration
         try:
-            step = np.linalg.solve(problem.jacobian(condition, unknowns), residual)
+            step = np.asarray(np.linalg.solve(problem.jacobian(condition, unknowns), residual), dtype=np.float64)
         except np.linalg.LinAlgError:
             break
         unknowns, better = _descend(equations, unknowns, step, residual)

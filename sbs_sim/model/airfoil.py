@@ -94,9 +94,7 @@ def viterna(
     return np.sign(alpha) * cl, cd
 
 
-def extend_polar(
-    alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: float
-) -> tuple[Array, Array, Array]:
+def extend_polar(alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: float) -> tuple[Array, Array, Array]:
     """Extend a polar to the full circle by `viterna` from its last point on either side.
 
     Parameters

@@ -98,7 +98,25 @@ def _section_forces(p, j, strip, start, count, ut0, ut1, up0, up1):
 
 
 @kernel
-def blade_terms(p, j, row, strip, beta, beta_rate, xi, xi_rate, cosine, sine, pitch, inflow0, inflow1, flow, rates, base, hang):
+def blade_terms(
+    p,
+    j,
+    row,
+    strip,
+    beta,
+    beta_rate,
+    xi,
+    xi_rate,
+    cosine,
+    sine,
+    pitch,
+    inflow0,
+    inflow1,
+    flow,
+    rates,
+    base,
+    hang,
+):
     """Fill the work row of one blade of rotor j: hinge moments, couplings and loads without accelerations.
 
     Parameters
@@ -179,11 +197,7 @@ def blade_terms(p, j, row, strip, beta, beta_rate, xi, xi_rate, cosine, sine, pi
     ff_n = cb * (f3 + h3) - sb * (f1 + h1)
     row[P.FLAP_MOMENT] = mn - rotor[P.FLAP_SPRING] * beta - s1 * ff_n - a1 * (cb * g3 - sb * g1)
     row[P.LAG_MOMENT] = (
-        -(e_f * ft + cb * mt)
-        + k1 * (f2 + h2)
-        + k2 * g2
-        - rotor[P.LAG_SPRING] * xi
-        - rotor[P.LAG_DAMPING] * xi_rate
+        -(e_f * ft + cb * mt) + k1 * (f2 + h2) + k2 * g2 - rotor[P.LAG_SPRING] * xi - rotor[P.LAG_DAMPING] * xi_rate
     )
     row[P.A2] = e_f * (k1 + cb * s1) + cb * cb * a1
     row[P.NORMAL_MOMENT] = rotor[P.HINGE] * fn + mn
@@ -191,7 +205,20 @@ def blade_terms(p, j, row, strip, beta, beta_rate, xi, xi_rate, cosine, sine, pi
     # six-vectors about the hub in the blade's basis; p_F = (p1, p2, 0), d = (cb, 0, sb), f = (0, -1, 0)
     p1, p2 = e_l * cx + e_f, e_l * sx
     k2_hub = e_f * s1 + cb * a1_hub
-    _store(p, j, row, P.FLAP_COUPLING, c, s, -s1 * sb, 0.0, s1 * cb, s1 * p2 * cb, -s1 * p1 * cb - a1_hub, s1 * p2 * sb)
+    _store(
+        p,
+        j,
+        row,
+        P.FLAP_COUPLING,
+        c,
+        s,
+        -s1 * sb,
+        0.0,
+        s1 * cb,
+        s1 * p2 * cb,
+        -s1 * p1 * cb - a1_hub,
+        s1 * p2 * sb,
+    )
     _store(p, j, row, P.LAG_COUPLING, c, s, 0.0, -k1, 0.0, k2_hub * sb, 0.0, -k1 * p1 - k2_hub * cb)
 
     # aerodynamic minus inertial load: with b = h - q the acceleration that the hub itself feels

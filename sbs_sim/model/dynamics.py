@@ -109,7 +109,23 @@ def _rotor_terms(p, j, x, swash, psi, air, om, g, work):
         gradient = cyclic * omega * (lambdac * cosine + lambdas * sine)
         induced = omega * rotor[P.RADIUS] * lambda0
         lift, c, s, p1, p2, cb, sb = blade_terms(
-            p, j, row, work.strip, beta, beta_rate, xi, xi_rate, cosine, sine, pitch, induced, gradient, flow, rates, base, hang
+            p,
+            j,
+            row,
+            work.strip,
+            beta,
+            beta_rate,
+            xi,
+            xi_rate,
+            cosine,
+            sine,
+            pitch,
+            induced,
+            gradient,
+            flow,
+            rates,
+            base,
+            hang,
         )
         add_inertia(p, j, work.rotor_inertia[j], c, s, p1, p2, cb, sb)
         thrust += lift

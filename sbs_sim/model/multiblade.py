@@ -5,6 +5,7 @@ coordinate a_d for even N_b only: N_b coordinates for N_b blades, one to one. La
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ Array = NDArray[np.float64]
 
 def blade_matrix(blades: int, azimuth: float) -> Array:
     """T with blade angles = T @ coordinates, shape (blades, blades), the first blade at `azimuth` [rad]."""
-    columns = [np.ones(blades)]
+    columns: list[NDArray[Any]] = [np.ones(blades)]
     psi = azimuth + 2 * math.pi * np.arange(blades) / blades
     for harmonic in range(1, (blades - 1) // 2 + 1):
         columns += [-np.cos(harmonic * psi), -np.sin(harmonic * psi)]

@@ -2,6 +2,8 @@
 
 import signal
 import sys
+import threading
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +12,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException, ParameterException
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
@@ -18,6 +20,7 @@ from rclpy.signals import SignalHandlerOptions
 from sbs_sim.errors import SbsError
 
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+STOP_PERIOD = 0.2  # s, longest time that a thread takes to see the end
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 
 
@@ -86,6 +89,9 @@ def diagnostic(name: str, problems: Sequence[tuple[bytes, str]], values: dict[st
 def run(make_nodes: Callable[[], list[Node]], args: list[str] | None = None) -> int:
     """Run nodes until they are interrupted; the exit code of the process.
 
+    Every node has a thread and an executor of its own, so that a long service of one does not delay the messages of
+    another. (rclpy's multi-threaded executor would do the same at many times the load.)
+
     Parameters
     ----------
     make_nodes : callable
@@ -98,40 +104,48 @@ def run(make_nodes: Callable[[], list[Node]], args: list[str] | None = None) -> 
     int
         0 after an interruption (Ctrl-C, SIGTERM), 1 if the nodes could not start.
     """
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
         print(f"cannot start ROS: {_one_line(error)}", file=sys.stderr)
         return 1
     nodes: list[Node] = []
+    threads: list[threading.Thread] = []
     try:
-        _interrupt_on(signal.SIGTERM)
         nodes = make_nodes()
-        executor = MultiThreadedExecutor(num_threads=2)
-        for node in nodes:
-            executor.add_node(node)
-        executor.spin()
+        threads = [threading.Thread(target=_spin, args=(node, stop), name=node.get_name()) for node in nodes]
+        for thread in threads:
+            thread.start()
+        stop.wait()
     except SbsError as error:
         print(_one_line(error), file=sys.stderr)
         return 1
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
     finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C must not tear the clean end apart
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        stop.set()
+        for thread in threads:
+            thread.join()
         for node in reversed(nodes):
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
 
 
-def _interrupt_on(number: int) -> None:
-    """Treat a signal as Ctrl-C."""
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    signal.signal(number, interrupt)
+def _spin(node: Node, stop: threading.Event) -> None:
+    """Serve a node until the end; an error in a callback is told and does not end the node."""
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    while not stop.is_set() and rclpy.ok():
+        try:
+            executor.spin_once(timeout_sec=STOP_PERIOD)
+        except ExternalShutdownException:
+            break
+        except Exception:
+            node.get_logger().error(f"internal error: {traceback.format_exc()}")
+    executor.shutdown()
+    stop.set()
 
 
 def _one_line(error: Exception) -> str:

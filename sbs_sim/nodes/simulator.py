@@ -1,25 +1,25 @@
 """Node `simulator`: flies an aircraft in real time.
 
-Publishes `state`, `rotors`, `inflow`, `odom`, `/clock`, `status`, `diagnostics`; subscribes `swashplate`; serves `pause`,
-`step`, `reset`, `set_wind`. The executable brings up the control mixer in the same process.
+Publishes `state`, `rotors`, `inflow`, `odom`, `/clock`, `status`, `diagnostics`; subscribes `swashplate`; serves
+`pause`, `step`, `reset`, `set_wind`. The executable brings up the control mixer in the same process.
 """
 
 import math
 import sys
 import threading
+import traceback
 from collections.abc import Callable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import SetBool
-
 from sbs_msgs.msg import BodyState, InflowArray, RotorStateArray, SimulationStatus, SwashplateArray
 from sbs_msgs.srv import Reset, SetWind, Step
+from std_srvs.srv import SetBool
+
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint, trim
 from sbs_sim.errors import SbsError, TrimError
@@ -49,7 +49,11 @@ PARAMETERS = {
     "lead_lag": Parameter(True, "Blades lead and lag"),
     "cyclic_inflow": Parameter(True, "Inflow has its sine and cosine parts"),
     "command_timeout": Parameter(
-        0.5, "Age of a command beyond which a warning is given [s of simulation time]; 0 is never", 0.0, 1e6, fixed=False
+        0.5,
+        "Age of a command beyond which a warning is given [s of simulation time]; 0 is never",
+        0.0,
+        1e6,
+        fixed=False,
     ),
     "wind": Parameter([0.0, 0.0, 0.0], "Steady wind: north, east, down, where the air goes to [m/s]"),
 }
@@ -60,14 +64,14 @@ HEALTH_PERIOD = 1.0  # s of wall time between diagnostics
 class Simulator(Node):
     """See the module."""
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__("simulator", **options)
+    def __init__(self) -> None:
+        super().__init__("simulator")
         values = declare(self, PARAMETERS)
         self.components = checked_components(values["components"])
-        self._aircraft = Aircraft.load(values["aircraft"])
+        self.aircraft = Aircraft.load(values["aircraft"])
         self._fidelity = {"lead_lag": values["lead_lag"], "cyclic_inflow": values["cyclic_inflow"]}
         self._loop = FlightLoop(self._start(values), values["real_time_factor"], values["command_timeout"])
-        self._messages = StateMessages(self._aircraft)
+        self._messages = StateMessages(self.aircraft)
         self._clock_message, self._status = Clock(), SimulationStatus()
         self._rejected, self._last_problem = 0, ""
         self._last_report: Report | None = None
@@ -86,11 +90,11 @@ class Simulator(Node):
         angles = ", ".join(
             f"{name} {math.degrees(value):.3f}" for name, value in zip(CONTROL_NAMES, point.controls, strict=True)
         )
-        self.get_logger().info(f"{self._aircraft.name} trimmed with [deg] {angles}")
+        self.get_logger().info(f"{self.aircraft.name} trimmed with [deg] {angles}")
         position = (0.0, 0.0, -values["altitude"])
         return Simulation(
-            self._aircraft,
-            trimmed_state(self._aircraft, point, position, values["heading"], wind.velocity),
+            self.aircraft,
+            trimmed_state(self.aircraft, point, position, values["heading"], wind.velocity),
             point.swashplate,
             tick=1.0 / values["publish_rate"],
             azimuth_step=math.radians(values["azimuth_step_deg"]),
@@ -100,7 +104,7 @@ class Simulator(Node):
 
     def _trim(self, airspeed: float, climb_rate: float, sideslip: float, turn_rate: float) -> TrimPoint:
         """Trim that can be flown: every control within its limits."""
-        point = trim(self._aircraft, airspeed, climb_rate, sideslip, turn_rate, **self._fidelity)
+        point = trim(self.aircraft, airspeed, climb_rate, sideslip, turn_rate, **self._fidelity)
         if point.beyond_limits:
             raise TrimError("this flight needs " + "; ".join(point.beyond_limits))
         return point
@@ -114,13 +118,16 @@ class Simulator(Node):
         self._status_topic = self.create_publisher(SimulationStatus, "status", STATE_QOS)
         self._health = self.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
         self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
-        # a reset may trim for a while: commands must come through meanwhile
-        services = MutuallyExclusiveCallbackGroup()
-        self.create_service(SetBool, "pause", self._on_pause, callback_group=services)
-        self.create_service(Step, "step", self._on_step, callback_group=services)
-        self.create_service(Reset, "reset", self._on_reset, callback_group=services)
-        self.create_service(SetWind, "set_wind", self._on_set_wind, callback_group=services)
+        self.create_service(SetBool, "pause", self._on_pause)
+        self.create_service(Step, "step", self._on_step)
+        self.create_service(Reset, "reset", self._on_reset)
+        self.create_service(SetWind, "set_wind", self._on_set_wind)
         self.create_timer(HEALTH_PERIOD, self._publish_health)
+
+    @property
+    def time(self) -> float:
+        """Simulation time [s]."""
+        return self._loop.time
 
     # ----------------------------------------------------------------------------------------------------- inputs
 
@@ -133,13 +140,14 @@ class Simulator(Node):
             self.get_logger().warning(f"swashplate rejected: {error}", throttle_duration_sec=COMPLAINT_PERIOD)
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        return _answer(response, lambda: self._loop.pause(request.data), "paused" if request.data else "playing")
+        done = "paused" if request.data else "playing"
+        return self._answer(response, lambda: self._loop.pause(request.data), done)
 
     def _on_step(self, request: Step.Request, response: Step.Response) -> Step.Response:
         def step() -> None:
             response.sim_time = self._loop.step(request.ticks)
 
-        return _answer(response, step, f"{request.ticks} ticks")
+        return self._answer(response, step, f"{request.ticks} ticks")
 
     def _on_reset(self, request: Reset.Request, response: Reset.Response) -> Reset.Response:
         def reset() -> None:
@@ -149,13 +157,13 @@ class Simulator(Node):
             point = self._trim(request.airspeed, request.climb_rate, request.sideslip, request.turn_rate)
             wind = self._loop.wind().velocity
             position = point_array(request.position)
-            state = trimmed_state(self._aircraft, point, position, request.heading, wind)
+            state = trimmed_state(self.aircraft, point, position, request.heading, wind)
             self._loop.reset(state, point.swashplate)
 
-        return _answer(response, reset, "reset")
+        return self._answer(response, reset, "reset")
 
     def _on_set_wind(self, request: SetWind.Request, response: SetWind.Response) -> SetWind.Response:
-        return _answer(response, lambda: self._loop.set_wind(lambda now: wind_of(request, now)), "wind set")
+        return self._answer(response, lambda: self._loop.set_wind(lambda now: wind_of(request, now)), "wind set")
 
     def _on_parameters(self, parameters: list[Any]) -> SetParametersResult:
         try:
@@ -167,6 +175,19 @@ class Simulator(Node):
         except SbsError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _answer(self, response: Any, act: Callable[[], Any], done: str) -> Any:
+        """Carry out a request and say how it went; an error changes nothing and is told."""
+        try:
+            act()
+        except SbsError as error:
+            response.success, response.message = False, str(error)
+        except Exception as error:  # an error of ours must not end the flight of others
+            self.get_logger().error(f"internal error: {traceback.format_exc()}")
+            response.success, response.message = False, f"internal error, see the log: {error!r}"
+        else:
+            response.success, response.message = True, done
+        return response
 
     # ---------------------------------------------------------------------------------------------------- outputs
 
@@ -235,17 +256,6 @@ class Simulator(Node):
         super().destroy_node()
 
 
-def _answer(response: Any, act: Callable[[], Any], done: str) -> Any:
-    """Carry out a request and say how it went; an error changes nothing and is told."""
-    try:
-        act()
-    except SbsError as error:
-        response.success, response.message = False, str(error)
-    else:
-        response.success, response.message = True, done
-    return response
-
-
 def checked_components(names: list[str]) -> tuple[str, ...]:
     """Names of components, if all are known.
 
@@ -262,7 +272,9 @@ def checked_components(names: list[str]) -> tuple[str, ...]:
 
 def _nodes() -> list[Node]:
     simulator = Simulator()
-    return [simulator, ControlMixer()] if "control_mixer" in simulator.components else [simulator]
+    if "control_mixer" not in simulator.components:
+        return [simulator]
+    return [simulator, ControlMixer(now=lambda: simulator.time, aircraft=simulator.aircraft)]
 
 
 def main(args: list[str] | None = None) -> None:

@@ -167,16 +167,19 @@ class Model:
         return psi0 + self.speeds * h * steps
 
     def jacobian(self, x, swash=None, azimuth_count=12, rows=slice(None), columns=None, step=1e-6):
-        """Return rows and columns of the averaged derivative's derivative by the simulation state."""
+        """Return rows and columns of the averaged derivative's derivative by the simulation state.
+
+        `step` is one number or one for each column.
+        """
         columns = range(self.layout.size) if columns is None else columns
         result = []
-        for i in columns:
+        for i, delta in zip(columns, np.broadcast_to(step, len(columns)), strict=True):
             difference = 0.0
             for sign in (1, -1):
                 moved = np.array(x, dtype=float)
-                moved[i] += sign * step
+                moved[i] += sign * delta
                 difference = difference + sign * self.averaged(moved, swash, azimuth_count)[0]
-            result.append(difference[rows] / (2 * step))
+            result.append(difference[rows] / (2 * delta))
         return np.stack(result, axis=1)
 
     def rotor_places(self):

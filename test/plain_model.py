@@ -607,11 +607,7 @@ def hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, 
         about_flap += cross(s * blade.d, load)
         about_lag += cross(blade.flap_arm + s * blade.d, load)
     flap = blade.f @ about_flap - rotor.flap_spring * blade.flap
-    lag = (
-        -rotor.rotation * blade.u @ about_lag
-        - rotor.lag_spring * blade.lag
-        - rotor.lag_damping * blade.lag_rate
-    )
+    lag = -rotor.rotation * blade.u @ about_lag - rotor.lag_spring * blade.lag - rotor.lag_damping * blade.lag_rate
     return flap, lag
 
 
@@ -640,9 +636,7 @@ def residual(instant, unknowns):
     moment = moment - cross(om, inertia @ om)
     hinges = []
     for j, rotor in enumerate(ac.rotors):
-        hub_force, hub_moment = hub_loads(
-            instant, j, origin_acceleration, body_rate_dot, flap_dd[j], lag_dd[j]
-        )
+        hub_force, hub_moment = hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd[j], lag_dd[j])
         hub_force = hub_force + duct_force(instant, j)
         force = force + hub_force
         moment = moment + hub_moment + cross(np.asarray(rotor.hub, dtype=float), hub_force)

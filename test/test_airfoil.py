@@ -248,9 +248,7 @@ def test_linear_573_follows_its_formulas():
     table = TABLES["linear_573"]
     inside = np.abs(table.alpha) < 12.1 * DEG
     for row, reynolds in enumerate(table.reynolds):
-        for alpha, cl, cd in zip(
-            table.alpha[inside], table.cl[row, inside], table.cd[row, inside], strict=True
-        ):
+        for alpha, cl, cd in zip(table.alpha[inside], table.cl[row, inside], table.cd[row, inside], strict=True):
             lift = abs(alpha)
             if lift > 10.2 * DEG:
                 # Tangent at 10.2 deg and level at 12 deg: a parabola with its top at 12 deg, 0.9 deg above.
@@ -421,11 +419,7 @@ def test_a_written_table_reads_back(tmp_path):
     for name in ("reynolds", "alpha", "cl", "cd"):
         np.testing.assert_array_equal(getattr(again, name), getattr(table, name))
     assert again.name == "copy"
-    assert (
-        (tmp_path / "copy.csv")
-        .read_text()
-        .startswith("# one\n# two\nreynolds,alpha_deg,cl,cd\n50000,-180,0.0")
-    )
+    assert (tmp_path / "copy.csv").read_text().startswith("# one\n# two\nreynolds,alpha_deg,cl,cd\n50000,-180,0.0")
 
 
 def test_a_byte_order_mark_and_spaces_do_no_harm(tmp_path):

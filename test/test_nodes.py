@@ -172,11 +172,9 @@ def test_odom_is_the_same_motion_in_ros_axes(client):
 def test_a_step_of_each_control_moves_its_axis(client, hover, control, read, sign):
     wanted = hover.controls.copy()
     wanted[control] += DEGREE
-    client.publish("controls", controls_message(wanted))
-    begin = stamp(client.next("state"))
-    state = client.next("state", lambda m: stamp(m) > begin + 0.3)
+    state = client.publish_until("controls", controls_message(wanted), "state", lambda m: abs(read(m)) > 0.05)
     values = np.array([state.velocity.z, *body_rates(state)])
-    assert sign * read(state) > 0.02
+    assert sign * read(state) > 0
     assert np.argmax(np.abs(values)) == control
 
 
@@ -443,3 +441,15 @@ def test_controls_message_names_the_pilot_controls():
         "longitudinal_cyclic",
         "differential_longitudinal_cyclic",
     }
+
+
+def test_nodes_yaml_holds_the_defaults_of_every_parameter():
+    from ruamel.yaml import YAML
+
+    from sbs_sim.aircraft import config_folder
+    from sbs_sim.nodes import control_mixer, simulator
+
+    written = YAML(typ="safe").load((config_folder() / "nodes.yaml").read_text())
+    for name, module in (("simulator", simulator), ("control_mixer", control_mixer)):
+        declared = {key: parameter.default for key, parameter in module.PARAMETERS.items()}
+        assert written[name]["ros__parameters"] == declared

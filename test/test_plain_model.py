@@ -104,9 +104,7 @@ def test_rotating_flap_frequency():
     """nu^2 = 1 + e_0 S1/A1 + K/(A1 Omega^2), 1.237 per revolution."""
     ac, r, s1, a1 = heavy_hub()
     stiffness = -slope(lambda h: blade_derivative(ac, (h, 0, 0, 0), lead_lag=False)[0][0]) / r.speed**2
-    assert stiffness == pytest.approx(
-        1 + r.hinge_offset * s1 / a1 + r.flap_spring / (a1 * r.speed**2), rel=1e-8
-    )
+    assert stiffness == pytest.approx(1 + r.hinge_offset * s1 / a1 + r.flap_spring / (a1 * r.speed**2), rel=1e-8)
     assert np.sqrt(stiffness) == pytest.approx(1.237, abs=1e-3)
 
 
@@ -581,9 +579,7 @@ def inflow_slope(ac, inflow, velocity, rotor=1):
     """Return the (3, 3) derivative of the unloaded inflow equation by lambda0, lambdas, lambdac [1/s]."""
 
     def rate(inflow):
-        return plain_model.inflow_rate(
-            ac, ac.rotors[rotor], [], [], inflow, np.asarray(velocity, float), True
-        )
+        return plain_model.inflow_rate(ac, ac.rotors[rotor], [], [], inflow, np.asarray(velocity, float), True)
 
     return np.stack([slope(lambda h, e=e: rate(inflow + h * e), 1e-6) for e in np.eye(3)], axis=1)
 

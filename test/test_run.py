@@ -119,9 +119,7 @@ def test_missing_compiler(clone):
 def test_everything_that_is_missing_is_in_one_line(clone):
     for name in ("g++", "cmake", "make", "python3"):
         clone.remove(name)
-    assert_one_line(
-        clone.call("build"), "missing: g++, cmake, make, python3;", "g++ cmake make python3 python3-venv"
-    )
+    assert_one_line(clone.call("build"), "missing: g++, cmake, make, python3;", "g++ cmake make python3 python3-venv")
 
 
 def test_python_without_venv_and_headers(clone):

@@ -45,9 +45,7 @@ def make_table() -> AirfoilTable:
     """Return the airfoil at all Reynolds numbers."""
     steps = round(np.degrees(STALL) / STEP_DEG)
     alpha = np.arange(-steps, steps + 1) * np.radians(STEP_DEG)
-    polars = [
-        extend_polar(alpha, attached_lift(alpha), attached_drag(re, alpha), ASPECT_RATIO) for re in REYNOLDS
-    ]
+    polars = [extend_polar(alpha, attached_lift(alpha), attached_drag(re, alpha), ASPECT_RATIO) for re in REYNOLDS]
     cl, cd = np.array([polar[1] for polar in polars]), np.array([polar[2] for polar in polars])
     return AirfoilTable("linear_573", REYNOLDS, polars[0][0], cl, cd)
 

@@ -96,9 +96,7 @@ def make_table(reynolds: Array = REYNOLDS, step_deg: float = STEP_DEG) -> Airfoi
 
 def report(table: AirfoilTable) -> None:
     """Print the characteristics of each polar."""
-    print(
-        "Slope [1/rad] over 0..2 and 0..8 deg, maximum lift, least drag, join with Viterna, least confidence"
-    )
+    print("Slope [1/rad] over 0..2 and 0..8 deg, maximum lift, least drag, join with Viterna, least confidence")
     print("       Re    0-2    0-8  cl_max  [deg]   cd_min  join     cl      cd  confidence")
     for reynolds in table.reynolds:
         alpha, cl, cd = (values[len(values) // 2 :] for values in trusted_polar(reynolds, STEP_DEG))

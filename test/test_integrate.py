@@ -1,0 +1,202 @@
+"""Steps in time: order, agreement of the methods, flights that are repeated, bounded, and answer rightly."""
+
+import numpy as np
+import pytest
+from helpers import Model, build, linear_airfoil
+from test_conservation import ONE_SECOND, PSI, STEP, differences, disturbed
+
+from sbs_sim import Simulation, simulate
+from sbs_sim.errors import SimulationError
+from sbs_sim.model import state as S
+from sbs_sim.model.integrate import PARTITIONED, RK4
+from sbs_sim.simulation import trimmed_state
+
+QUARTER = 0.25  # s, ten revolutions
+FIVE_DEG = 720  # steps of 5 deg in that time
+
+
+@pytest.fixture(scope="module")
+def smooth_model(tmp_path_factory):
+    """The aircraft with an airfoil table without kinks in use, which would cost the order."""
+    airfoil = linear_airfoil(tmp_path_factory.mktemp("airfoils") / "plain.csv")
+    return Model(build(every_rotor={"airfoil": airfoil}))
+
+
+def flights(model, hover, refinements, method=RK4):
+    """Return the states after a quarter of a second with steps of 5 deg / refinement."""
+    x, swash = disturbed(model, hover)
+    return [model.fly(x, FIVE_DEG * k, QUARTER / (FIVE_DEG * k), swash, method=method) for k in refinements]
+
+
+def changes(states):
+    """Return the largest differences of successive states."""
+    return np.abs(np.diff(states, axis=0)).max(axis=1)
+
+
+# -- order ---------------------------------------------------------------------------------------------------
+
+
+def test_runge_kutta_is_of_fourth_order(smooth_model, hover):
+    """Half the step, a sixteenth of the change."""
+    change = changes(flights(smooth_model, hover, (1, 2, 4, 8)))
+    np.testing.assert_allclose(change[:-1] / change[1:], 16.0, atol=1.0)
+
+
+def test_five_degrees_are_enough_for_the_real_airfoil(sbs, hover):
+    """In a violent quarter of a second no state is off by more than 1e-4 of its unit (1.6e-5 measured)."""
+    coarse, fine = flights(Model(sbs), hover, (1, 16))
+    assert np.abs(coarse - fine).max() < 1e-4
+
+
+def test_partitioned_scheme_is_of_first_order(smooth_model, hover):
+    """The paper's Figure 3, forcing of the previous step (MODEL.md section 7): half the step, half the change."""
+    change = changes(flights(smooth_model, hover, (8, 16, 32, 64), PARTITIONED))
+    np.testing.assert_allclose(change[:-1] / change[1:], 2.0, atol=0.15)
+
+
+def test_partitioned_scheme_converges_to_the_coupled_solution(smooth_model, hover):
+    coupled = flights(smooth_model, hover, (8,))[0]
+    errors = [np.abs(x - coupled).max() for x in flights(smooth_model, hover, (8, 16, 32, 64), PARTITIONED)]
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 2.0, atol=0.15)
+    # at the same step the coupled solution is better by orders of magnitude
+    coarse, fine = flights(smooth_model, hover, (8, 32))
+    assert np.abs(coarse - fine).max() < 1e-4 * errors[0]
+
+
+def test_partitioned_scheme_by_name(sbs, hover):
+    """`simulate` offers both methods; in the equilibrium of hover they agree."""
+    flown = [simulate(sbs, hover, hover.controls, 0.2, method=name) for name in ("rk4", "partitioned")]
+    np.testing.assert_allclose(flown[1]["state"], flown[0]["state"], atol=1e-9)
+
+
+# -- flights -------------------------------------------------------------------------------------------------
+
+
+def test_same_commands_give_the_same_flight_to_the_last_bit(sbs, hover):
+    """Two simulations side by side, with their ticks interleaved."""
+
+    def commands(tick):
+        return hover.swashplate + 0.01 * np.sin(0.3 * tick + np.arange(6).reshape(2, 3))
+
+    pair = [Simulation(sbs, trimmed_state(sbs, hover), commands(0)) for _ in range(2)]
+    for tick in range(50):
+        for simulation in pair:
+            simulation.set_swashplate(commands(tick))
+            simulation.advance()
+    np.testing.assert_array_equal(pair[1].state, pair[0].state)
+    assert pair[0].step == 50 * pair[0].steps_per_tick
+    assert pair[0].time == pytest.approx(0.5, abs=1e-12)
+
+
+def test_ticks_only_divide_the_flight(sbs, hover):
+    """Ticks of 5 and 10 ms with the same step give the same flight."""
+    x, swash = disturbed(Model(sbs), hover)
+    ends = []
+    for tick, count in ((0.005, 100), (0.01, 50)):
+        simulation = Simulation(sbs, x, swash, tick=tick, azimuth_step=np.radians(4.8))
+        for _ in range(count):
+            simulation.advance()
+        ends.append(simulation.state)
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-12)
+
+
+def test_azimuth_step_is_kept(sbs, hover):
+    """The step is the largest part of the tick that turns the fastest rotor by no more than asked."""
+    for degrees in (1.0, 5.0, 7.3):
+        simulation = Simulation(sbs, trimmed_state(sbs, hover), hover.swashplate, azimuth_step=np.radians(degrees))
+        per_step = np.degrees(simulation.step_size * sbs.rotors[0].speed)
+        assert per_step <= degrees * (1 + 1e-9)
+        assert per_step > degrees * simulation.steps_per_tick / (simulation.steps_per_tick + 1) - 1e-9
+
+
+def test_quaternion_stays_a_rotation(sbs, hover):
+    model = Model(sbs)
+    x, swash = disturbed(model, hover)
+    x[S.RATES : S.BODY_SIZE] = 3.0, -2.0, 4.0
+    x = model.fly(x, ONE_SECOND, STEP, swash, PSI)
+    assert np.linalg.norm(x[S.ATTITUDE : S.VELOCITY]) == pytest.approx(1.0, abs=1e-14)
+
+
+def test_rotors_turn_for_hours_without_losing_their_place(sbs, hover):
+    """A flight that begins at step 10^9 (four days) after whole revolutions is the one from step 0."""
+    model = Model(sbs)
+    x, swash = disturbed(model, hover)
+    h = np.radians(5.0) / model.speeds[0]
+    start = model.fly(x, 72, h, swash)
+    late = model.fly(x, 72, h, swash, first_step=72 * 13_888_889)
+    # 7e7 rad keep 1e-8 rad in double precision
+    assert differences(late, start).max() < 1e-5
+
+
+@pytest.mark.parametrize("descent", [2.0, 4.0, 7.0, 10.0, 15.0, 25.0])
+def test_descent_through_the_rotors_wake_stays_finite(sbs, hover, descent):
+    """Vortex ring and turbulent wake, where momentum theory does not hold: one second, finite and plausible."""
+    start = trimmed_state(sbs, hover)
+    start[S.VELOCITY : S.RATES] = 0.3, 0.2, descent
+    flight = simulate(sbs, start, hover.controls, 1.0)
+    assert np.all(np.isfinite(flight["state"]))
+    assert flight["w"][-1] < descent  # the thrust rises, as a rotor's that is met from below
+    assert flight["thrust"].min() > 50.0
+
+
+def test_flight_without_lag_and_cyclic_inflow_holds_them(sbs, hover):
+    """What is switched off keeps zero all the flight, whatever the other states do."""
+    x, _ = disturbed(Model(sbs), hover)
+    layout = sbs.layout
+    for j in range(2):
+        x[layout.lag(j)] = x[layout.inflow(j).start + 1 : layout.inflow(j).stop] = 0.0
+    flight = simulate(sbs, x, hover.controls, 0.3, lead_lag=False, cyclic_inflow=False)
+    for j in range(2):
+        for part in (layout.lag(j), layout.lag_rate(j), slice(layout.inflow(j).start + 1, layout.inflow(j).stop)):
+            np.testing.assert_array_equal(flight["state"][:, part], 0.0)
+    assert np.abs(np.diff(flight["a1(1)"])).max() > 1e-4
+
+
+def test_implausible_state_stops_the_flight_at_the_last_good_step(sbs, hover):
+    """The message names step, time, state and bound; the state kept is finite and within the bounds."""
+    start = trimmed_state(sbs, hover)
+    start[sbs.layout.flap_rate(0).start] = 600.0  # overshoots 1.5 rad within a revolution
+    simulation = Simulation(sbs, start, hover.swashplate, tick=0.1)
+    reached = r"step \d+ \(t = [\d.]+ s\) would take \S+ to .*: plausible are"
+    with pytest.raises(SimulationError, match=reached):
+        simulation.advance()
+    assert np.all(np.isfinite(simulation.state))
+    simulation.checked_state(simulation.state)
+    simulation.reset(trimmed_state(sbs, hover), hover.swashplate)
+    simulation.advance()
+
+
+# -- answers to the controls ---------------------------------------------------------------------------------
+
+
+def answer(aircraft, hover, control, seconds=0.15):
+    """Return the change of p, q, r [rad/s] and of w [m/s] after one more degree of one control."""
+    controls = hover.controls.copy()
+    controls[control] += np.radians(1.0)
+    flight = simulate(aircraft, hover, controls, seconds)
+    return {name: flight[name][-1] for name in "pqrw"}
+
+
+@pytest.mark.parametrize(
+    ("control", "axis", "sign", "others"),
+    [
+        (0, "w", -1, 0.001),  # collective: up
+        (1, "p", 1, 0.25),  # lateral cyclic: right side down, with some adverse yaw
+        (2, "q", -1, 0.001),  # longitudinal cyclic: nose down
+        (3, "r", -1, 0.25),  # its difference tilts the right rotor forward, the left one back: nose left
+    ],
+)
+def test_every_control_moves_its_axis(sbs, hover, control, axis, sign, others):
+    """With the phase of sbs.yaml longitudinal cyclic is almost pure pitch, its difference almost pure yaw."""
+    found = answer(sbs, hover, control)
+    assert sign * found[axis] > 0.015
+    assert max(abs(value) for name, value in found.items() if name not in (axis, "w")) < others * abs(found[axis])
+
+
+def test_phase_decides_what_longitudinal_cyclic_does(sbs, hover):
+    """With a phase of 0 two thirds of the pitch are lost, and the difference is roll more than yaw (section 4)."""
+    unrigged = build(every_rotor={"swashplate_phase_deg": 0.0})
+    share = answer(unrigged, hover, 2)["q"] / answer(sbs, hover, 2)["q"]
+    assert share == pytest.approx(1 / 3, abs=0.08)
+    difference = answer(unrigged, hover, 3)
+    assert abs(difference["p"]) > 2 * abs(difference["r"])

@@ -216,6 +216,7 @@ class Simulator(Node):
         status.missed_deadlines = report.missed_deadlines
         status.steps = report.step
         status.dropped_messages = report.dropped
+        status.rejected_messages = self._rejected
         status.fault = report.fault
         self._status_topic.publish(status)
 

@@ -124,6 +124,7 @@ class Simulation:
         self.steps_per_tick = max(1, math.ceil(fastest * tick / azimuth_step * (1 - 1e-12)))
         self.step_size = tick / self.steps_per_tick
         self._method = METHODS[method]
+        self._held = held_states(aircraft, lead_lag, cyclic_inflow)
         self._params = aircraft.params(lead_lag, cyclic_inflow)
         self._work = P.make_work(self._params)
         self._bounds = plausible_bounds(aircraft)
@@ -146,7 +147,9 @@ class Simulation:
         return self._field.wind
 
     def checked_state(self, state: ArrayLike) -> Array:
-        """Copy of a simulation state that is complete, finite and plausible, its quaternion normalised.
+        """Copy of a simulation state that is complete, finite and plausible.
+
+        Its quaternion is normalised, and what the fidelity holds at zero is zero.
 
         Raises
         ------
@@ -164,6 +167,7 @@ class Simulation:
         if not 0.5 <= norm <= 2.0:
             raise SimulationError(f"state attitude has a norm of {norm:g}: allowed are 0.5 to 2, a unit quaternion")
         values[S.ATTITUDE : S.ATTITUDE + 4] = quaternion / norm
+        values[self._held] = 0.0
         return values
 
     def checked_swashplate(self, angles: ArrayLike) -> Array:
@@ -266,6 +270,19 @@ def plausible_bounds(aircraft: Aircraft) -> Array:
         bounds[layout.flap(j)] = bounds[layout.lag(j)] = PLAUSIBLE_ANGLE
         bounds[layout.flap_rate(j)] = bounds[layout.lag_rate(j)] = PLAUSIBLE_ANGLE * 10 * rotor.speed
     return bounds
+
+
+def held_states(aircraft: Aircraft, lead_lag: bool, cyclic_inflow: bool) -> NDArray[np.int64]:
+    """Places of the states that stay zero without lag or without cyclic inflow."""
+    layout = aircraft.layout
+    index = np.arange(layout.size)
+    held: list[int] = []
+    for j in range(len(aircraft.rotors)):
+        if not lead_lag:
+            held += [*index[layout.lag(j)], *index[layout.lag_rate(j)]]
+        if not cyclic_inflow:
+            held += [*index[layout.inflow(j)][1:]]
+    return np.array(held, dtype=np.int64)
 
 
 def trimmed_state(

@@ -272,16 +272,34 @@ class _TrimProblem:
 
 
 def _follow_path(problem: _TrimProblem, condition: TrimCondition) -> tuple[Array, int]:
-    """Solve directly from hover, else along conditions between hover and the one wanted."""
+    """Solve directly from hover, else along conditions between hover and the one wanted.
+
+    A direct solution beyond the limits of the controls may lie on another branch (a stalled rotor can carry the
+    aircraft too), so it counts only where the path, which keeps to the branch of hover, ends.
+    """
     hover, iterations = _newton(problem, condition.scaled(0.0), problem.first_guess())
+    direct = None
     try:
-        solution, more = _newton(problem, condition, hover)
-        return solution, iterations + more
+        direct, more = _newton(problem, condition, hover)
+        iterations += more
+        if not problem.point(condition, direct, 0).beyond_limits:
+            return direct, iterations
     except TrimError:
         pass
-    done, step = 0.0, 0.25
+    try:
+        solution, more = _walk(problem, condition, hover)
+    except TrimError:
+        if direct is None:
+            raise
+        return direct, iterations
+    return solution, iterations + more
+
+
+def _walk(problem: _TrimProblem, condition: TrimCondition, hover: Array) -> tuple[Array, int]:
+    """Solve conditions between hover and the one wanted, each from the line through the two before."""
+    done, last, step = 0.0, 0.0, 0.25
     before = solution = hover
-    last = 0.0
+    iterations = 0
     while done < 1.0:
         share = min(1.0, done + step)
         guess = solution if done == last else solution + (solution - before) * (share - done) / (done - last)

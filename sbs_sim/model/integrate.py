@@ -51,7 +51,7 @@ def advance(p, x, swash, psi0, first_step, steps, h, wind, method, bounds, work)
         culprit = _first_implausible(new, bounds)
         if culprit >= 0:
             return i, culprit
-        x[:] = new
+        _copy(new, x)
     return steps, -1
 
 
@@ -60,8 +60,8 @@ def _step(p, x, swash, psi0, number, h, wind, fraction, share, method, work):
     """One step from x; the new state is left in the stage row."""
     stage, slope, total, first = work.stages[STAGE], work.stages[SLOPE], work.stages[SUM], work.stages[FIRST]
     time = number * h
-    stage[:] = x
-    total[:] = x
+    _copy(x, stage)
+    _copy(x, total)
     for k in range(4):
         ahead = 0.5 * ((k + 1) // 2)  # 0, 1/2, 1/2, 1
         _azimuths(p, psi0, number, ahead, h, work.psi)
@@ -69,7 +69,7 @@ def _step(p, x, swash, psi0, number, h, wind, fraction, share, method, work):
         derivative(p, stage, swash, work.psi, work.wind, work, slope)
         if method == PARTITIONED:
             if k == 0:
-                first[:] = slope
+                _copy(slope, first)
             else:
                 _freeze_forcing(p, x, stage, first, slope)
         weight = h / 3.0 if k == 1 or k == 2 else h / 6.0
@@ -77,10 +77,17 @@ def _step(p, x, swash, psi0, number, h, wind, fraction, share, method, work):
         for i in range(x.size):
             total[i] += weight * slope[i]
             stage[i] = x[i] + forward * slope[i]
-    stage[:] = total
+    _copy(total, stage)
     norm = 1.0 / math.sqrt(stage[3] ** 2 + stage[4] ** 2 + stage[5] ** 2 + stage[6] ** 2)
     for i in range(S.ATTITUDE, S.ATTITUDE + 4):
         stage[i] *= norm
+
+
+@kernel
+def _copy(source, target):
+    """Copy a state, element by element: a slice would be allocated."""
+    for i in range(source.size):
+        target[i] = source[i]
 
 
 @kernel

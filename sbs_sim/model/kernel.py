@@ -17,11 +17,14 @@ import numba
 # Everything that `fastmath` means except "there is no NaN" and "there is no infinity": the checks that
 # keep such numbers out of the state must survive the optimiser.
 FASTMATH = {"reassoc", "contract", "arcp", "nsz", "afn"}
+# Without numba's reference counting (`_nrt`) a kernel that allocates does not compile, and every look at a row of an
+# array saves two atomic operations: a third of the time of a derivative.
+OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FASTMATH, "_nrt": False}
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a piece of the model; it is inlined where it is called and leaves nothing on disk."""
-    return numba.njit(nogil=True, error_model="numpy", fastmath=FASTMATH, forceinline=True)(function)
+    return numba.njit(forceinline=True, **OPTIONS)(function)
 
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -30,7 +33,7 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     real = os.path.realpath(function.__code__.co_filename)
     function.__code__ = function.__code__.replace(co_filename=real)
     with _cache_in(cache_folder()):
-        return numba.njit(nogil=True, error_model="numpy", fastmath=FASTMATH, cache=True)(function)
+        return numba.njit(cache=True, **OPTIONS)(function)
 
 
 def cache_folder() -> Path:

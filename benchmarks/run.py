@@ -56,9 +56,8 @@ def main() -> None:
 
 def machine() -> dict[str, str]:
     """What the figures belong to."""
-    model = next(
-        (line.split(":")[1].strip() for line in Path("/proc/cpuinfo").open() if line.startswith("model name")), "?"
-    )
+    lines = Path("/proc/cpuinfo").read_text().splitlines()
+    model = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), "?")
     packages = {name: version(name) for name in ("numba", "llvmlite", "numpy")}
     load = f"{os.getloadavg()[0]:.2f}"
     return {"cpu": model, "cores": str(os.cpu_count()), "python": platform.python_version(), "load": load, **packages}
@@ -162,14 +161,13 @@ class Watch:
     def __init__(self) -> None:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
-
         from sbs_msgs.msg import BodyState, Controls, InflowArray, RotorStateArray, SimulationStatus
 
         rclpy.init()
         self.node = rclpy.create_node("benchmark")
         self.arrivals: list[float] = []
         self.status: Any = None
-        self.velocity = 0.0
+        self.acceleration = 0.0
         self.counts = {"rotors": 0, "inflow": 0}
         self.node.create_subscription(BodyState, "state", self._on_state, 10)
         self.node.create_subscription(SimulationStatus, "status", self._on_status, 10)
@@ -183,7 +181,7 @@ class Watch:
 
     def _on_state(self, message: Any) -> None:
         self.arrivals.append(time.perf_counter())
-        self.velocity = message.acceleration.z
+        self.acceleration = message.acceleration.z
 
     def _on_status(self, message: Any) -> None:
         self.status = message
@@ -257,10 +255,10 @@ def latency_rows(watch: Watch) -> list[Row]:
     collective = trim(Aircraft.load("sbs")).controls[0]
     delays = []
     for i in range(101):
-        before = watch.velocity
+        before = watch.acceleration
         start = time.perf_counter()
         watch.pilot.publish(Controls(collective=collective + math.radians(0.3 * (-1) ** i)))
-        while abs(watch.velocity - before) < 0.05 and time.perf_counter() - start < 1.0:
+        while abs(watch.acceleration - before) < 0.05 and time.perf_counter() - start < 1.0:
             time.sleep(0.0002)
         delays.append(1e3 * (time.perf_counter() - start))
         time.sleep(0.05 + 0.001 * (i % 10))

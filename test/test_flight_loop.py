@@ -14,7 +14,7 @@ import time
 import numpy as np
 import pytest
 
-from sbs_sim import Simulation
+from sbs_sim import Simulation, simulate
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight_loop import QUEUE_LENGTH, FlightLoop
 from sbs_sim.model.state import ATTITUDE, VELOCITY
@@ -84,6 +84,12 @@ def refusal(function, *arguments):
         function(*arguments)
     assert "\n" not in str(caught.value)
     return str(caught.value)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled(sbs, hover):
+    """Fly once, so that no flight below waits for the compiler."""
+    simulate(sbs, hover, hover.controls, 0.01)
 
 
 @pytest.fixture
@@ -344,6 +350,20 @@ def test_reset_while_flying(sbs, hover, simulation):
     np.testing.assert_array_equal(reports[place].snapshot.state, state)
     steps = [report.step for report in reports]
     assert steps == sorted(steps)  # time goes on
+
+
+def test_a_reset_clears_commands_that_have_not_acted_yet(simulation, hover):
+    with flying(simulation) as (loop, reader):
+        loop.pause(True)
+        loop.command(hover.swashplate + 0.001)
+        loop.step(60)
+        wait_until(lambda: reader.newest().command_timed_out)
+        state = loop.call(simulation.snapshot).state
+        loop.command(hover.swashplate + 0.01)
+        loop.reset(state, hover.swashplate + 0.002)
+        loop.step(1)
+        np.testing.assert_array_equal(loop.swashplate(), hover.swashplate + 0.002)
+        wait_until(lambda: not reader.newest().command_timed_out)
 
 
 def test_a_bad_reset_is_refused_and_changes_nothing(sbs, hover, simulation):

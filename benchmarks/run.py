@@ -161,6 +161,7 @@ class Watch:
     def __init__(self) -> None:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
+
         from sbs_msgs.msg import BodyState, Controls, InflowArray, RotorStateArray, SimulationStatus
 
         rclpy.init()

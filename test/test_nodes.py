@@ -16,6 +16,9 @@ from geometry_msgs.msg import Point, Vector3  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
 from ros_harness import controls_message, swashplate_message, world  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
+from scipy.spatial.transform import Rotation  # noqa: E402
+from std_srvs.srv import SetBool  # noqa: E402
+
 from sbs_msgs.msg import (  # noqa: E402
     BodyState,
     Controls,
@@ -25,9 +28,6 @@ from sbs_msgs.msg import (  # noqa: E402
     SwashplateArray,
 )
 from sbs_msgs.srv import Reset, SetWind, Step  # noqa: E402
-from scipy.spatial.transform import Rotation  # noqa: E402
-from std_srvs.srv import SetBool  # noqa: E402
-
 from sbs_sim import Aircraft, trim  # noqa: E402
 
 DOMAINS = itertools.cycle(1 + (os.getpid() + i) % 100 for i in range(100))

@@ -10,8 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter as ROSParameter
-from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
 
+from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError
 from sbs_sim.mixer import Mixer

@@ -13,6 +13,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
+
 from sbs_msgs.msg import (
     BodyState,
     Controls,
@@ -23,7 +24,6 @@ from sbs_msgs.msg import (
     SwashplateArray,
 )
 from sbs_msgs.srv import SetWind
-
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S

@@ -16,10 +16,10 @@ from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
-from sbs_msgs.msg import BodyState, InflowArray, RotorStateArray, SimulationStatus, SwashplateArray
-from sbs_msgs.srv import Reset, SetWind, Step
 from std_srvs.srv import SetBool
 
+from sbs_msgs.msg import BodyState, InflowArray, RotorStateArray, SimulationStatus, SwashplateArray
+from sbs_msgs.srv import Reset, SetWind, Step
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint, trim
 from sbs_sim.errors import SbsError, TrimError

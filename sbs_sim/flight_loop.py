@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.model.wind import Wind
 from sbs_sim.simulation import Simulation, Snapshot
@@ -199,6 +200,11 @@ class FlightLoop:
     def swashplate(self) -> np.ndarray:
         """The swashplate angles in force [rad], shape (n_rotors, 3)."""
         return self._simulation.swashplate
+
+    @property
+    def aircraft(self) -> Aircraft:
+        """The aircraft that flies."""
+        return self._simulation.aircraft
 
     @property
     def time(self) -> float:

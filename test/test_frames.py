@@ -127,3 +127,12 @@ def test_hub_axes_of_a_shaft_that_points_down(tilt):
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-7)
     assert np.linalg.det(axes) == pytest.approx(1.0, abs=1e-7)
     np.testing.assert_allclose(axes[:, 2], [-math.sin(tilt), 0.0, -math.cos(tilt)], atol=1e-7)
+
+
+@pytest.mark.parametrize("angle", [1e-3, 1e-5, 1e-6, 1e-8, 1e-12])
+def test_hub_axes_are_orthonormal_close_to_straight_down_and_straight_up(angle):
+    for down in (1.0, -1.0):
+        shaft = np.array([math.sin(angle), 0.3 * math.sin(angle), down * math.cos(angle)])
+        axes = hub_axes(shaft)
+        np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
+        np.testing.assert_allclose(axes[:, 2], -shaft / np.linalg.norm(shaft), atol=1e-12)

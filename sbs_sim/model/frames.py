@@ -64,11 +64,13 @@ def hub_axes(shaft_direction: ArrayLike) -> Array:
     shaft = np.asarray(shaft_direction, dtype=float)
     shaft = shaft / np.linalg.norm(shaft)
     cosine = float(up @ shaft)
-    if cosine < -1 + 1e-12:  # straight down: every half turn is as small as the other; take the one about x
-        return np.diag([1.0, -1.0, -1.0])
     axis = np.cross(up, shaft)
+    sine_squared = float(axis @ axis)
+    if sine_squared == 0.0:  # straight down, every half turn is as small as the other: take the one about x
+        return np.eye(3) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
     skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + skew + skew @ skew / (1 + cosine)
+    # (1 - cos) / sin^2 instead of 1 / (1 + cos): the latter loses its digits near a shaft that points down
+    return np.eye(3) + skew + (1 - cosine) / sine_squared * (skew @ skew)
 
 
 @kernel

@@ -17,14 +17,21 @@ from sbs_sim.errors import SbsError
 from sbs_sim.mixer import Mixer
 from sbs_sim.model.state import SWASHPLATE_NAMES
 from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, to_time
-from sbs_sim.nodes.host import COMMAND_QOS, STATE_QOS, Parameter, declare, diagnostic, run
+from sbs_sim.nodes.host import (
+    COMMAND_QOS,
+    COMPLAINT_PERIOD,
+    HEALTH_PERIOD,
+    STATE_QOS,
+    Parameter,
+    declare,
+    diagnostic,
+    run,
+)
 
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
 }
 RAMP_PERIOD = 0.01  # s of wall time between outputs while a swashplate is still on its way
-COMPLAINT_PERIOD = 1.0  # s between complaints about bad input
-HEALTH_PERIOD = 1.0  # s of wall time between diagnostics
 
 
 class ControlMixer(Node):

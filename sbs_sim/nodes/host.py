@@ -20,6 +20,8 @@ from rclpy.signals import SignalHandlerOptions
 from sbs_sim.errors import SbsError
 
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+HEALTH_PERIOD = 1.0  # s of wall time between diagnostics
+COMPLAINT_PERIOD = 1.0  # s between complaints about bad input
 STOP_PERIOD = 0.2  # s, longest time that a thread takes to see the end
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 

@@ -6,29 +6,26 @@ Publishes `state`, `rotors`, `inflow`, `odom`, `/clock`, `status`, `diagnostics`
 
 import math
 import sys
-import threading
 import traceback
 from collections.abc import Callable
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
-from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool
 
-from sbs_msgs.msg import BodyState, InflowArray, RotorStateArray, SimulationStatus, SwashplateArray
+from sbs_msgs.msg import SwashplateArray
 from sbs_msgs.srv import Reset, SetWind, Step
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint, trim
 from sbs_sim.errors import SbsError, TrimError
-from sbs_sim.flight_loop import FlightLoop, Report
+from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.control_mixer import ControlMixer
-from sbs_sim.nodes.conversions import StateMessages, point_array, swashplate_array, to_time, wind_of
-from sbs_sim.nodes.host import COMMAND_QOS, STATE_QOS, Parameter, declare, diagnostic, run
+from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
+from sbs_sim.nodes.host import COMMAND_QOS, COMPLAINT_PERIOD, Parameter, declare, run
+from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.simulation import Simulation, trimmed_state
 
 COMPONENTS = ("simulator", "control_mixer")
@@ -57,8 +54,6 @@ PARAMETERS = {
     ),
     "wind": Parameter([0.0, 0.0, 0.0], "Steady wind: north, east, down, where the air goes to [m/s]"),
 }
-COMPLAINT_PERIOD = 1.0  # s between complaints about bad input
-HEALTH_PERIOD = 1.0  # s of wall time between diagnostics
 
 
 class Simulator(Node):
@@ -71,14 +66,13 @@ class Simulator(Node):
         self.aircraft = Aircraft.load(values["aircraft"])
         self._fidelity = {"lead_lag": values["lead_lag"], "cyclic_inflow": values["cyclic_inflow"]}
         self._loop = FlightLoop(self._start(values), values["real_time_factor"], values["command_timeout"])
-        self._messages = StateMessages(self.aircraft)
-        self._clock_message, self._status = Clock(), SimulationStatus()
-        self._rejected, self._last_problem = 0, ""
-        self._last_report: Report | None = None
-        self._make_interfaces()
+        self._outputs = Outputs(self, self._loop)
+        self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
+        self.create_service(SetBool, "pause", self._on_pause)
+        self.create_service(Step, "step", self._on_step)
+        self.create_service(Reset, "reset", self._on_reset)
+        self.create_service(SetWind, "set_wind", self._on_set_wind)
         self.add_on_set_parameters_callback(self._on_parameters)
-        self._publisher = threading.Thread(target=self._publish_all, name="publisher", daemon=True)
-        self._publisher.start()
         self._loop.start()
 
     def _start(self, values: dict[str, Any]) -> Simulation:
@@ -109,21 +103,6 @@ class Simulator(Node):
             raise TrimError("this flight needs " + "; ".join(point.beyond_limits))
         return point
 
-    def _make_interfaces(self) -> None:
-        self._state = self.create_publisher(BodyState, "state", STATE_QOS)
-        self._rotors = self.create_publisher(RotorStateArray, "rotors", STATE_QOS)
-        self._inflow = self.create_publisher(InflowArray, "inflow", STATE_QOS)
-        self._odom = self.create_publisher(Odometry, "odom", STATE_QOS)
-        self._clock_topic = self.create_publisher(Clock, "/clock", STATE_QOS)
-        self._status_topic = self.create_publisher(SimulationStatus, "status", STATE_QOS)
-        self._health = self.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
-        self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
-        self.create_service(SetBool, "pause", self._on_pause)
-        self.create_service(Step, "step", self._on_step)
-        self.create_service(Reset, "reset", self._on_reset)
-        self.create_service(SetWind, "set_wind", self._on_set_wind)
-        self.create_timer(HEALTH_PERIOD, self._publish_health)
-
     @property
     def time(self) -> float:
         """Simulation time [s]."""
@@ -135,8 +114,7 @@ class Simulator(Node):
         try:
             self._loop.command(swashplate_array(message))
         except SbsError as error:
-            self._rejected += 1
-            self._last_problem = str(error)
+            self._outputs.count_rejection(str(error))
             self.get_logger().warning(f"swashplate rejected: {error}", throttle_duration_sec=COMPLAINT_PERIOD)
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
@@ -189,71 +167,10 @@ class Simulator(Node):
             response.success, response.message = True, done
         return response
 
-    # ---------------------------------------------------------------------------------------------------- outputs
-
-    def _publish_all(self) -> None:
-        """Publish every report until the last; a thread of its own, so that the flight never waits."""
-        while (report := self._loop.reports.get()) is not None:
-            self._say_changes(report)
-            self._last_report = report
-            stamp = to_time(report.time)
-            self._clock_message.clock = stamp
-            self._clock_topic.publish(self._clock_message)
-            if report.snapshot is not None:
-                self._messages.fill(report.snapshot)
-                self._state.publish(self._messages.state)
-                self._rotors.publish(self._messages.rotors)
-                self._inflow.publish(self._messages.inflow)
-                self._odom.publish(self._messages.odom)
-            self._publish_status(report, stamp)
-
-    def _publish_status(self, report: Report, stamp: Any) -> None:
-        status = self._status
-        status.header.stamp = stamp
-        status.state = SimulationStatus.PLAYING if report.playing else SimulationStatus.PAUSED
-        status.sim_time = report.time
-        status.real_time_factor = report.real_time_factor
-        status.missed_deadlines = report.missed_deadlines
-        status.steps = report.step
-        status.dropped_messages = report.dropped
-        status.rejected_messages = self._rejected
-        status.fault = report.fault
-        self._status_topic.publish(status)
-
-    def _say_changes(self, report: Report) -> None:
-        """One log line when a fault or a time-out begins."""
-        before = self._last_report
-        if report.fault and (before is None or report.fault != before.fault):
-            self.get_logger().error(f"paused: {report.fault}")
-        if report.command_timed_out and (before is None or not before.command_timed_out):
-            self.get_logger().warning(f"no command for {self._loop.command_timeout:g} s: holding the last one")
-
-    def _publish_health(self) -> None:
-        report = self._last_report
-        if report is None:
-            return
-        problems = []
-        if report.fault:
-            problems.append((DiagnosticStatus.ERROR, report.fault))
-        if report.command_timed_out:
-            problems.append((DiagnosticStatus.WARN, "command timed out, holding the last one"))
-        if report.dropped:
-            problems.append((DiagnosticStatus.WARN, f"{report.dropped} reports dropped"))
-        values = {
-            "sim_time": f"{report.time:.3f}",
-            "real_time_factor": f"{report.real_time_factor:.4f}",
-            "missed_deadlines": report.missed_deadlines,
-            "rejected_messages": self._rejected,
-            "last_rejection": self._last_problem or "none",
-        }
-        message = DiagnosticArray(status=[diagnostic("simulator", problems, values)])
-        message.header.stamp = to_time(report.time)
-        self._health.publish(message)
-
     def destroy_node(self) -> None:
         """End the flight and the publishing, then the node."""
         self._loop.stop()
-        self._publisher.join()
+        self._outputs.join()
         super().destroy_node()
 
 

@@ -15,6 +15,10 @@ from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
 
 Array = NDArray[np.float64]
 
+# s; swashplates that rest at their target may use this much time at once when a new one comes: what an output is held
+# for at 100 Hz. More, and a rest would be a leave to jump; nothing, and every command would come one period late.
+REST_CREDIT = 0.01
+
 
 class Mixer:
     """Mixer of an aircraft with the memory that its rate limits need.
@@ -37,13 +41,13 @@ class Mixer:
         self._swash_low, self._swash_high = swash[:, :, 0], swash[:, :, 1]
         self._rates = np.array([[rotor.swashplate_rate] for rotor in aircraft.rotors])
         self._target: Array | None = None
-        self._followed: Array | None = None  # the target in force since the last `move`
+        self._rests = True  # at its target since the last `move`
         self._angles: Array | None = None
         self._time = 0.0
         self.saturated: tuple[str, ...] = ()
 
     def set_target(self, controls: ArrayLike) -> None:
-        """Set the pilot controls [rad], shape (4,), that count from the next `move` on.
+        """Set the pilot controls [rad], shape (4,), for the next `move`.
 
         Raises
         ------
@@ -67,9 +71,8 @@ class Mixer:
     def move(self, time: float) -> Array:
         """Swashplate angles [rad], shape (n_rotors, 3), at a time [s].
 
-        They move towards the target at their actuators' rates; until this time that is the target of the last
-        call, so that a new one after a long rest does not make them jump. Where the swashplates stand before the
-        first target is not known, so they are at the first target at once.
+        They move towards the target at their actuators' rates. Where the swashplates stand before the first target is
+        not known, so they are at the first target at once.
 
         Raises
         ------
@@ -78,14 +81,15 @@ class Mixer:
         """
         if self._target is None:
             raise SimulationError("the mixer has no controls yet")
-        if self._angles is None or self._followed is None:
+        if self._angles is None:
             self._angles = self._target.copy()
         else:
-            reach = self._rates * max(0.0, time - self._time)
-            gap = self._followed - self._angles
+            elapsed = max(0.0, time - self._time)
+            reach = self._rates * (min(elapsed, REST_CREDIT) if self._rests else elapsed)
+            gap = self._target - self._angles
             # where the target is in reach it is taken itself: a sum would miss it by rounding
-            self._angles = np.where(np.abs(gap) <= reach, self._followed, self._angles + np.sign(gap) * reach)
-        self._followed = self._target
+            self._angles = np.where(np.abs(gap) <= reach, self._target, self._angles + np.sign(gap) * reach)
+        self._rests = self.arrived
         self._time = time
         return self._angles.copy()
 

@@ -36,8 +36,8 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "simulator = sbs_sim.nodes.simulator:main",
-            "control_mixer = sbs_sim.nodes.control_mixer:main",
+            "simulator = sbs_sim.executables:simulator",
+            "control_mixer = sbs_sim.executables:control_mixer",
         ],
     },
 )

@@ -275,7 +275,7 @@ class Aircraft:
         air = self.environment
         return P.Params(
             air=np.array([air.air_density, 1 / air.kinematic_viscosity, air.gravity, *self.body.flat_plate_areas]),
-            body=np.array([mass, *first, *inertia.ravel(), self.body.mass]),
+            body=np.array([mass, *first, *inertia.ravel()]),
             switches=np.array(
                 [lead_lag, cyclic_inflow, complete, self.options.hub_moment == "complete"], dtype=np.int64
             ),

@@ -28,7 +28,7 @@ QUEUE_LENGTH = 100  # snapshots between the flight and their reader: one second 
 HURRY_TICKS = 10  # the schedule is kept by hurrying up to this many ticks; beyond, real time is lost for good
 IDLE_PERIOD = 0.1  # s of wall time between reports while paused
 RATE_WINDOW = 1.0  # s of wall time over which the real-time factor is measured
-MOST_STEP_TICKS = 10_000
+MOST_STEP_TICKS = 1_000  # some half a second of wall time for which other services wait
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Report:
     real_time_factor : float
         Simulation time over wall time, of the last second.
     missed_deadlines : int
-        Ticks that were ready later than one tick after they were due.
+        Ticks that were ready later than one tick after they were due, and those that real time has lost.
     dropped : int
         Reports that no reader took in time.
     fault : str
@@ -95,11 +95,12 @@ class FlightLoop:
         self._playing = True
         self._stopping = False
         self._fault = ""
+        self.resets = 0  # read by those who must know that what they commanded before is void
         self._missed = self._dropped = 0
         # At most the newest command. A deque, for it is emptied and filled by two threads and loses nothing.
         self._commands: collections.deque[np.ndarray] = collections.deque(maxlen=1)
         self._command_time: float | None = None
-        self._anchor = 0.0  # wall time at which the tick `_anchor_tick` was due
+        self._anchor = 0.0  # wall time from which `_ticks_due` counts the ticks that were due
         self._ticks_due = 0
         self._deadline = math.inf  # wall time by which the tick that is flown should be ready
         self._marks: collections.deque[tuple[float, float]] = collections.deque()
@@ -258,7 +259,10 @@ class FlightLoop:
             return True
         now = time.monotonic()
         period = self._simulation.tick / pace
-        if replan or now - self._anchor - self._ticks_due * period > HURRY_TICKS * period:
+        late = now - self._anchor - self._ticks_due * period
+        if replan or late > HURRY_TICKS * period:
+            # no hurry can make up for this: the ticks that real time has lost all missed their deadline
+            self._missed += 0 if replan else int(late / period)
             self._anchor, self._ticks_due = now, 0
         due = self._anchor + self._ticks_due * period
         while (left := due - time.monotonic()) > 0:
@@ -316,6 +320,7 @@ class FlightLoop:
 
     def _reset(self, state: ArrayLike, swashplate: ArrayLike) -> None:
         self._simulation.reset(state, swashplate)
+        self.resets += 1
         self._fault = ""
         self._commands.clear()
         self._command_time = None

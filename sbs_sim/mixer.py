@@ -68,11 +68,27 @@ class Mixer:
             texts += _clipped([f"{rotor.name} {name}" for name in SWASHPLATE_NAMES], row, limited)
         self.saturated = tuple(texts)
 
+    def stand(self, angles: ArrayLike) -> None:
+        """Take it that the swashplates stand at these angles [rad], shape (n_rotors, 3), and rest there."""
+        self._angles = np.array(angles, dtype=float)
+        self._rests = True
+
+    def forget(self) -> None:
+        """Drop the target, as if there had been no controls yet."""
+        self._target = self._angles = None
+        self._rests = True
+        self.saturated = ()
+
+    @property
+    def rests(self) -> bool:
+        """True if the swashplates were at their target at the last `move`."""
+        return self._rests
+
     def move(self, time: float) -> Array:
         """Swashplate angles [rad], shape (n_rotors, 3), at a time [s].
 
         They move towards the target at their actuators' rates. Where the swashplates stand before the first target is
-        not known, so they are at the first target at once.
+        not known unless `stand` has told it; else they are at the first target at once.
 
         Raises
         ------

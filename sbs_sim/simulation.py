@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 
 METHODS = {"rk4": RK4, "partitioned": PARTITIONED}
 
+# A tick is one uninterrupted call of compiled code; this many steps take it a tenth of a second.
+MOST_STEPS_PER_TICK = 10_000
+
 # Beyond these magnitudes a state is not plausible and the simulation stops. The angles and the inflow are far outside
 # the validity of the model; the velocity is beyond the speed of sound.
 PLAUSIBLE_POSITION = 1e8  # m
@@ -122,6 +125,11 @@ class Simulation:
         fastest = max(rotor.speed for rotor in aircraft.rotors)
         # the margin keeps a step that is right but for rounding from being cut once more
         self.steps_per_tick = max(1, math.ceil(fastest * tick / azimuth_step * (1 - 1e-12)))
+        if self.steps_per_tick > MOST_STEPS_PER_TICK:
+            raise SimulationError(
+                f"azimuth_step = {math.degrees(azimuth_step):g} deg takes {self.steps_per_tick} steps in a tick of"
+                f" {tick:g} s: allowed are up to {MOST_STEPS_PER_TICK}"
+            )
         self.step_size = tick / self.steps_per_tick
         self._method = METHODS[method]
         self._held = held_states(aircraft, lead_lag, cyclic_inflow)

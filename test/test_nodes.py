@@ -5,6 +5,9 @@ import math
 import os
 import re
 import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -14,7 +17,7 @@ rclpy = pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import Point, Vector3  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
-from ros_harness import controls_message, swashplate_message, world  # noqa: E402
+from ros_harness import EXECUTABLES, controls_message, environment, swashplate_message, world  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
@@ -247,6 +250,7 @@ def test_wind_moves_the_aircraft_and_a_gust_passes(client):
         ),
         ("set_wind", SetWind, {"gust_duration": -1.0}, "gust_duration = -1.0"),
         ("set_wind", SetWind, {"turbulence_intensity": Vector3(z=-1.0)}, "turbulence_intensity.z = -1.0"),
+        ("step", Step, {"ticks": 1001}, "ticks = 1001: allowed are 1 to 1000"),
         ("step", Step, {"ticks": 4294967295}, "ticks = 4294967295: allowed are 1 to"),
     ],
 )
@@ -392,7 +396,7 @@ def test_as_fast_as_possible_is_faster_than_real_time(own_world):
 
 
 def test_starts_in_trimmed_forward_flight_with_wind(own_world):
-    own_world.start("simulator", airspeed=15.0, climb_rate=1.0, turn_rate=0.1, wind="[3.0, 0.0, 0.0]", altitude=50.0)
+    own_world.start("simulator", airspeed=15, climb_rate=1.0, turn_rate=0.1, wind="[3, 0, 0]", altitude=50)
     client = own_world.client
     client.watch("state", BodyState)
     state = client.next("state")
@@ -413,6 +417,10 @@ def test_starts_in_trimmed_forward_flight_with_wind(own_world):
         ({"airspeed": 1000.0}, "parameter airspeed = 1000.0: allowed are -100 to 100"),
         ({"publish_rate": 0.0}, "parameter publish_rate = 0.0: allowed are 1 to 10000"),
         ({"components": "[autopilot]"}, "parameter components"),
+        ({"components": "[control_mixer]"}, "parameter components"),
+        ({"components": "[]"}, "parameter components"),
+        ({"airsped": 3.0}, "parameter airsped: unknown"),
+        ({"publish_rate": 1.0, "azimuth_step_deg": 0.01}, "1440000 steps in a tick"),
         ({"wind": "[1.0, 2.0]"}, "parameter wind"),
         ({"wind": "[1.0, 2.0, .nan]"}, "velocity.z = nan"),
         ({"airspeed": 95.0}, "no trim"),
@@ -455,3 +463,63 @@ def test_nodes_yaml_holds_the_defaults_of_every_parameter():
     for name, module in (("simulator", simulator), ("control_mixer", control_mixer)):
         declared = {key: parameter.default for key, parameter in module.PARAMETERS.items()}
         assert written[name]["ros__parameters"] == declared
+
+
+def test_a_command_from_before_a_reset_is_void(client, hover):
+    """Paused half way to a new position: the reset's trim is held, whatever was still on its way."""
+    assert client.call(SetBool, "pause", data=True).success
+    for _ in range(3):
+        client.publish("controls", controls_message(hover.controls + [8 * DEGREE, 0, 0, 0]))
+        client.spin(0.1)
+    assert client.call(Reset, "reset").success
+    client.spin(0.3)
+    assert client.call(Step, "step", ticks=20).success
+    client.spin(0.3)
+    np.testing.assert_allclose(vector(client.messages["state"][-1].velocity), 0.0, atol=1e-6)
+
+
+def test_the_first_command_after_a_reset_moves_at_the_rate_of_the_actuators(client, hover):
+    seen = len(client.messages["swashplate"])
+    target = hover.controls + [8 * DEGREE, 0, 0, 0]
+    client.publish_until(
+        "controls",
+        controls_message(target),
+        "swashplate",
+        lambda m: m.rotors[0].collective == pytest.approx(target[0]),
+    )
+    moved = [m.rotors[0].collective for m in client.messages["swashplate"][seen:]]
+    steps = np.diff([hover.controls[0], *moved])
+    # 120 deg/s; an output may be some milliseconds late, and the next one makes up for it
+    assert moved[0] - hover.controls[0] == pytest.approx(1.2 * DEGREE, rel=1e-6)
+    assert steps.max() < 6 * DEGREE
+
+
+@pytest.mark.parametrize("delay", [0.1, 0.3, 0.5, 0.8, 1.1])
+def test_an_interruption_during_the_start_is_quiet(own_world, delay):
+    process = own_world.start("simulator")
+    own_world.client.spin(delay)
+    assert process.interrupt() in (0, -signal.SIGINT)  # Python's own start is not ours
+    assert "Traceback" not in process.output
+
+
+def test_an_interruption_during_a_long_service_does_not_wait_for_it(own_world):
+    process = own_world.start("simulator", azimuth_step_deg=0.05)
+    client = own_world.client
+    client.watch("state", BodyState)
+    client.next("state")
+    assert client.call(SetBool, "pause", data=True).success
+    stepping = client.node.create_client(Step, "step")
+    client.until(stepping.service_is_ready, "step")
+    stepping.call_async(Step.Request(ticks=1000))  # half a minute of arithmetic
+    client.spin(0.5)
+    begin = time.monotonic()
+    assert process.interrupt() == 0
+    assert time.monotonic() - begin < 10.0
+    assert "Traceback" not in process.output
+
+
+def test_an_argument_that_is_not_ours_is_refused():
+    command = [sys.executable, str(EXECUTABLES / "simulator"), "--bogus"]
+    ended = subprocess.run(command, env=environment(next(DOMAINS)), capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 2
+    assert ended.stderr.strip() == "unknown argument --bogus: parameters are given as --ros-args -p name:=value"

@@ -17,7 +17,7 @@ from sbs_sim.errors import TrimError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.average import averaged_derivative
-from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
+from sbs_sim.model.frames import euler_to_quaternion, hub_axes, rotation_matrix
 
 Array = NDArray[np.float64]
 
@@ -204,14 +204,15 @@ class _TrimProblem:
         return scales[self._equations]
 
     def first_guess(self) -> Array:
-        """Hover by momentum theory: equal shares of the weight, a collective that is right to a few degrees."""
+        """Hover by momentum theory: the weight on the rotors that point up, a collective right to a few degrees."""
         aircraft, air = self.aircraft, self.aircraft.environment
         x = np.zeros(self.layout.size)
-        share = aircraft.body.mass * air.gravity / len(aircraft.rotors)
-        for j, rotor in enumerate(aircraft.rotors):
-            area = math.pi * rotor.radius**2
-            tip = rotor.speed * rotor.radius
-            x[self.layout.inflow(j).start] = math.sqrt(share / (2 * max(air.air_density, 1e-3) * area)) / tip
+        upward = [max(0.0, hub_axes(rotor.shaft_direction)[2, 2]) for rotor in aircraft.rotors]
+        lifting = sum(math.pi * rotor.radius**2 * up for rotor, up in zip(aircraft.rotors, upward, strict=True))
+        loading = aircraft.body.mass * air.gravity / max(lifting, 1e-6)
+        for j, (rotor, up) in enumerate(zip(aircraft.rotors, upward, strict=True)):
+            induced = math.sqrt(up * loading / (2 * max(air.air_density, 1e-3)))
+            x[self.layout.inflow(j).start] = induced / (rotor.speed * rotor.radius)
         return np.concatenate([[0.0, 0.0, math.radians(9.0), 0.0, 0.0, 0.0], x[self._places]])
 
     def state(self, condition: TrimCondition, unknowns: Array) -> tuple[Array, Array]:

@@ -20,9 +20,9 @@ AIR_SIZE = 6
 LEAD_LAG, CYCLIC_INFLOW, COMPLETE_COUPLING, COMPLETE_HUB_MOMENT = range(4)
 SWITCH_COUNT = 4
 
-# body: mass [kg], first moment about the c.g. [kg m], inertia row by row [kg m^2], total mass [kg]
-MASS, FIRST_MOMENT, INERTIA, TOTAL_MASS = 0, 1, 4, 13
-BODY_SIZE = 14
+# body: mass [kg], first moment about the c.g. [kg m], inertia row by row [kg m^2]
+MASS, FIRST_MOMENT, INERTIA = 0, 1, 4
+BODY_SIZE = 13
 
 # rotor: columns, SI units
 (
@@ -123,7 +123,7 @@ class Work(NamedTuple):
     loads : ndarray, shape (n_rotors, LOAD_SIZE)
         Output: thrust [N], torque [N m], hub force [N] and moment [N m] of the last derivative.
     aero : ndarray, shape (n_rotors, 3)
-        Thrust and the cosine and sine moments that drive the inflow.
+        Thrust [N] and the sine and cosine moments [N m] that drive the inflow.
     hub_flow : ndarray, shape (n_rotors, 3)
         Velocity of the hub relative to the air in hub axes [m/s].
     matrix : ndarray, shape (6, 6)

@@ -3,17 +3,18 @@
 Subscribes `controls`, publishes `swashplate` and `diagnostics`. Ranges and rates are those of the aircraft file.
 """
 
+import math
 import sys
-from collections.abc import Callable
+import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.parameter import Parameter as ROSParameter
 
 from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError
+from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.mixer import Mixer
 from sbs_sim.model.state import SWASHPLATE_NAMES
 from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, to_time
@@ -22,6 +23,7 @@ from sbs_sim.nodes.host import (
     COMPLAINT_PERIOD,
     HEALTH_PERIOD,
     STATE_QOS,
+    Component,
     Parameter,
     declare,
     diagnostic,
@@ -34,38 +36,52 @@ PARAMETERS = {
 RAMP_PERIOD = 0.01  # s of wall time between outputs while a swashplate is still on its way
 
 
-class ControlMixer(Node):
+class ControlMixer(Component):
     """See the module.
 
     Parameters
     ----------
-    now : callable, optional
-        Simulation time [s]; from /clock if not given. In the simulator's own process it spares the messages.
-    aircraft : Aircraft, optional
-        The simulator's; that of the node's own parameter if not given.
+    loop : FlightLoop, optional
+        The flight, if it is in the same process: the mixer then knows the time, where the swashplates stand and of
+        resets. Else time comes from /clock, and the swashplates are taken to be at the first target.
     """
 
-    def __init__(self, now: Callable[[], float] | None = None, aircraft: Aircraft | None = None) -> None:
+    def __init__(self, loop: FlightLoop | None = None) -> None:
         # the simulator owns time: rates are those of simulated time, and a pause holds the swashplates
-        clock_topic = ROSParameter("use_sim_time", value=now is None)
+        clock_topic = ROSParameter("use_sim_time", value=loop is None)
         super().__init__("control_mixer", parameter_overrides=[clock_topic])
-        self._now = now or (lambda: self.get_clock().now().nanoseconds * 1e-9)
-        if aircraft is None:
-            aircraft = Aircraft.load(declare(self, PARAMETERS)["aircraft"])
-        self._mixer = Mixer(aircraft)
+        self._loop = loop
+        self._mixer = Mixer(Aircraft.load(declare(self, PARAMETERS)["aircraft"]) if loop is None else loop.aircraft)
+        self._resets = 0
+        self._moved_at = -1.0
         self._rejected = 0
         self._last_problem = ""
-        self._said: tuple[str, ...] = ()
+        self._last_seen: dict[str, float] = {}
         self._output = self.create_publisher(SwashplateArray, "swashplate", COMMAND_QOS)
         self._health = self.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
         self.create_subscription(Controls, "controls", self._on_controls, COMMAND_QOS)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._ramp = self.create_timer(RAMP_PERIOD, self._move, clock=steady, autostart=False)
+        self._ramp = self.create_timer(RAMP_PERIOD, self._go_on, clock=steady, autostart=False)
         self.create_timer(HEALTH_PERIOD, self._publish_health, clock=steady)
 
+    def _now(self) -> float:
+        """Simulation time [s]."""
+        return self.get_clock().now().nanoseconds * 1e-9 if self._loop is None else self._loop.time
+
+    def _follow_resets(self) -> bool:
+        """Forget what was commanded before a reset; true if there was one."""
+        if self._loop is None or self._resets == self._loop.resets:
+            return False
+        self._resets = self._loop.resets
+        self._mixer.forget()
+        return True
+
     def _on_controls(self, message: Controls) -> None:
+        self._follow_resets()
         try:
             self._mixer.set_target(controls_array(message))
+            if self._loop is not None and self._mixer.rests:
+                self._mixer.stand(self._loop.swashplate())
         except SbsError as error:
             self._rejected += 1
             self._last_problem = str(error)
@@ -73,9 +89,16 @@ class ControlMixer(Node):
             return
         self._move()
 
+    def _go_on(self) -> None:
+        """Move by timer while there is a way to go; a pause or a reset ends it."""
+        if self._follow_resets():
+            self._ramp.cancel()
+        elif self._now() != self._moved_at:
+            self._move()
+
     def _move(self) -> None:
-        """Go on towards the target and publish; the timer runs while there is a way to go."""
-        now = self._now()
+        """Go towards the target and publish."""
+        now = self._moved_at = self._now()
         angles = self._mixer.move(now)
         message = SwashplateArray()
         message.header.stamp = to_time(now)
@@ -89,23 +112,26 @@ class ControlMixer(Node):
         self._say_once()
 
     def _say_once(self) -> None:
-        """One line per limit that is newly reached, not one per message."""
-        saturated = self._mixer.saturated
-        for text in saturated:
-            if text not in self._said:
+        """One line when a limit is reached; again only after it has been left for a while."""
+        now = time.monotonic()
+        for text in self._mixer.saturated:
+            if now - self._last_seen.get(text, -math.inf) > COMPLAINT_PERIOD:
                 self.get_logger().warning(f"clipped: {text}")
-        if saturated != self._said:
-            self._said = saturated
-            self._publish_health()
+                self._publish_health()
+            self._last_seen[text] = now
 
     def _publish_health(self) -> None:
         problems = [(DiagnosticStatus.WARN, f"clipped: {text}") for text in self._mixer.saturated]
-        values = {"rejected_messages": self._rejected, "last_rejection": self._last_problem or "none"}
+        values = {
+            "rate_limited": not self._mixer.arrived,
+            "rejected_messages": self._rejected,
+            "last_rejection": self._last_problem or "none",
+        }
         message = DiagnosticArray(status=[diagnostic("control_mixer", problems, values)])
         message.header.stamp = to_time(self._now())
         self._health.publish(message)
 
 
 def main(args: list[str] | None = None) -> None:
-    """Entry point of the executable `control_mixer`."""
+    """Mix until interrupted."""
     sys.exit(run(lambda: [ControlMixer()], args))

@@ -1,7 +1,7 @@
 """Arrays to messages and back.
 
-Inside, positions are NED and vectors FRD; `odom` alone is in the axes of REP 103 (ENU, FLU). Which is which stands in
-the frame_id of every message.
+Inside, position and attitude are NED and vectors FRD; `odom` alone is in the axes of REP 103 (ENU, FLU). The comments
+in the interface definitions say which field is in which frame.
 """
 
 import array
@@ -28,7 +28,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
-from sbs_sim.model.wind import Wind
+from sbs_sim.model.wind import LARGEST_WIND, Wind
 from sbs_sim.simulation import Snapshot, blade_angles
 
 Array = NDArray[np.float64]
@@ -79,7 +79,7 @@ def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
         gust_duration=request.gust_duration,
         turbulence_intensity=_triple(request.turbulence_intensity),
         turbulence_length=request.turbulence_length or DEFAULT_TURBULENCE_LENGTH,
-        turbulence_airspeed=request.turbulence_airspeed or max(speed, LEAST_TURBULENCE_AIRSPEED),
+        turbulence_airspeed=request.turbulence_airspeed or min(max(speed, LEAST_TURBULENCE_AIRSPEED), LARGEST_WIND),
         turbulence_direction=math.atan2(relative[1], relative[0]) if moving else heading,
         turbulence_seed=request.turbulence_seed,
     )

@@ -1,5 +1,6 @@
 """What every executable does alike: start ROS, run nodes, end cleanly; declare parameters; report health."""
 
+import array
 import signal
 import sys
 import threading
@@ -9,11 +10,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import rclpy
+import rclpy.utilities
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException, ParameterException
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter as ROSParameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
@@ -48,6 +51,13 @@ class Parameter:
     fixed: bool = True
 
 
+class Component(Node):
+    """A node of this package."""
+
+    def stop(self) -> None:
+        """Let go of what a callback may be waiting for; called once, before the node's thread is joined."""
+
+
 def declare(node: Node, parameters: dict[str, Parameter]) -> dict[str, Any]:
     """Declare parameters and return their values.
 
@@ -56,24 +66,39 @@ def declare(node: Node, parameters: dict[str, Parameter]) -> dict[str, Any]:
     SbsError
         A value of a wrong type or out of range: parameter, value and what is allowed in one line.
     """
-    values = {}
-    for name, parameter in parameters.items():
-        descriptor = ParameterDescriptor(description=parameter.description, read_only=parameter.fixed)
-        if parameter.least is not None and parameter.most is not None:
-            span = FloatingPointRange(from_value=float(parameter.least), to_value=float(parameter.most), step=0.0)
-            descriptor.floating_point_range = [span]
-        try:
-            values[name] = node.declare_parameter(name, parameter.default, descriptor).value
-        except InvalidParameterTypeException:
-            given = node._parameter_overrides[name].value
-            kind = type(parameter.default).__name__
-            raise SbsError(f"parameter {name} = {given!r}: allowed is a value of type {kind}") from None
-        except (InvalidParameterValueException, ParameterException):
-            given = node._parameter_overrides[name].value
-            raise SbsError(
-                f"parameter {name} = {given!r}: allowed are {parameter.least:g} to {parameter.most:g}"
-            ) from None
-    return values
+    given = node._parameter_overrides
+    known = {*parameters, "use_sim_time", "start_type_description_service"}
+    for name in given:
+        if name not in known and not name.startswith("qos_overrides"):
+            raise SbsError(f"parameter {name}: unknown, allowed are {', '.join(parameters)}")
+    return {name: _declare_one(node, name, parameter, given) for name, parameter in parameters.items()}
+
+
+def _declare_one(node: Node, name: str, parameter: Parameter, given: dict[str, ROSParameter]) -> Any:
+    descriptor = ParameterDescriptor(description=parameter.description, read_only=parameter.fixed)
+    allowed = f"allowed is a value like {parameter.default!r}"
+    if parameter.least is not None and parameter.most is not None:
+        span = FloatingPointRange(from_value=float(parameter.least), to_value=float(parameter.most), step=0.0)
+        descriptor.floating_point_range = [span]
+        allowed = f"allowed are {parameter.least:g} to {parameter.most:g}"
+    if name in given:
+        given[name] = ROSParameter(name, value=_as_floats(given[name].value, parameter.default))
+    try:
+        value = node.declare_parameter(name, parameter.default, descriptor).value
+    except ParameterException:
+        raise SbsError(f"parameter {name} = {given[name].value!r}: {allowed}") from None
+    if value is None:  # an empty list on the command line has no type
+        raise SbsError(f"parameter {name} is empty: {allowed}")
+    return value
+
+
+def _as_floats(value: Any, default: Any) -> Any:
+    """Whole numbers where numbers are wanted: 15 is as good as 15.0."""
+    if isinstance(default, float) and type(value) is int:
+        return float(value)
+    if isinstance(default, list) and isinstance(default[0], float) and isinstance(value, array.array | list | tuple):
+        return [float(item) if type(item) is int else item for item in value]
+    return value
 
 
 def diagnostic(name: str, problems: Sequence[tuple[bytes, str]], values: dict[str, Any]) -> DiagnosticStatus:
@@ -88,7 +113,7 @@ def diagnostic(name: str, problems: Sequence[tuple[bytes, str]], values: dict[st
     )
 
 
-def run(make_nodes: Callable[[], list[Node]], args: list[str] | None = None) -> int:
+def run(make_nodes: Callable[[], list[Component]], args: list[str] | None = None) -> int:
     """Run nodes until they are interrupted; the exit code of the process.
 
     Every node has a thread and an executor of its own, so that a long service of one does not delay the messages of
@@ -107,17 +132,21 @@ def run(make_nodes: Callable[[], list[Node]], args: list[str] | None = None) -> 
         0 after an interruption (Ctrl-C, SIGTERM), 1 if the nodes could not start.
     """
     stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    leftover = rclpy.utilities.remove_ros_args(args)[1:]
+    if leftover:
+        print(f"unknown argument {leftover[0]}: parameters are given as --ros-args -p name:=value", file=sys.stderr)
+        return 2
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
         print(f"cannot start ROS: {_one_line(error)}", file=sys.stderr)
         return 1
-    nodes: list[Node] = []
+    nodes: list[Component] = []
     threads: list[threading.Thread] = []
     try:
         nodes = make_nodes()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: stop.set())
         threads = [threading.Thread(target=_spin, args=(node, stop), name=node.get_name()) for node in nodes]
         for thread in threads:
             thread.start()
@@ -127,11 +156,15 @@ def run(make_nodes: Callable[[], list[Node]], args: list[str] | None = None) -> 
         return 1
     finally:
         stop.set()
+        for node in nodes:
+            node.stop()
         for thread in threads:
             thread.join()
         for node in reversed(nodes):
             node.destroy_node()
         rclpy.try_shutdown()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)  # a second one must not tear the end of the interpreter apart
     return 0
 
 

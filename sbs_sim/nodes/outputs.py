@@ -5,6 +5,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
+from rclpy.clock import Clock as SteadyClock
+from rclpy.clock import ClockType
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
@@ -37,7 +39,8 @@ class Outputs:
         self._clock = node.create_publisher(Clock, "/clock", STATE_QOS)
         self._status_topic = node.create_publisher(SimulationStatus, "status", STATE_QOS)
         self._health = node.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
-        node.create_timer(HEALTH_PERIOD, self._publish_health)
+        steady = SteadyClock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(HEALTH_PERIOD, self._publish_health, clock=steady)
         self._thread = threading.Thread(target=self._publish_all, name="publisher", daemon=True)
         self._thread.start()
 

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.node import Node
 from std_srvs.srv import SetBool
 
 from sbs_msgs.msg import SwashplateArray
@@ -24,7 +23,7 @@ from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
-from sbs_sim.nodes.host import COMMAND_QOS, COMPLAINT_PERIOD, Parameter, declare, run
+from sbs_sim.nodes.host import COMMAND_QOS, COMPLAINT_PERIOD, Component, Parameter, declare, run
 from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.simulation import Simulation, trimmed_state
 
@@ -56,7 +55,7 @@ PARAMETERS = {
 }
 
 
-class Simulator(Node):
+class Simulator(Component):
     """See the module."""
 
     def __init__(self) -> None:
@@ -65,15 +64,15 @@ class Simulator(Node):
         self.components = checked_components(values["components"])
         self.aircraft = Aircraft.load(values["aircraft"])
         self._fidelity = {"lead_lag": values["lead_lag"], "cyclic_inflow": values["cyclic_inflow"]}
-        self._loop = FlightLoop(self._start(values), values["real_time_factor"], values["command_timeout"])
-        self._outputs = Outputs(self, self._loop)
+        self.loop = FlightLoop(self._start(values), values["real_time_factor"], values["command_timeout"])
+        self._outputs = Outputs(self, self.loop)
         self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
         self.create_service(SetBool, "pause", self._on_pause)
         self.create_service(Step, "step", self._on_step)
         self.create_service(Reset, "reset", self._on_reset)
         self.create_service(SetWind, "set_wind", self._on_set_wind)
         self.add_on_set_parameters_callback(self._on_parameters)
-        self._loop.start()
+        self.loop.start()
 
     def _start(self, values: dict[str, Any]) -> Simulation:
         """Simulation in trimmed flight at the condition that the parameters name."""
@@ -81,12 +80,8 @@ class Simulator(Node):
             raise SbsError(f"parameter wind = {list(values['wind'])}: allowed are 3 numbers, north, east, down [m/s]")
         wind = Wind(velocity=tuple(values["wind"]))
         point = self._trim(*(values[name] for name in ("airspeed", "climb_rate", "sideslip", "turn_rate")))
-        angles = ", ".join(
-            f"{name} {math.degrees(value):.3f}" for name, value in zip(CONTROL_NAMES, point.controls, strict=True)
-        )
-        self.get_logger().info(f"{self.aircraft.name} trimmed with [deg] {angles}")
         position = (0.0, 0.0, -values["altitude"])
-        return Simulation(
+        simulation = Simulation(
             self.aircraft,
             trimmed_state(self.aircraft, point, position, values["heading"], wind.velocity),
             point.swashplate,
@@ -95,6 +90,11 @@ class Simulator(Node):
             wind=wind,
             **self._fidelity,
         )
+        angles = ", ".join(
+            f"{name} {math.degrees(value):.3f}" for name, value in zip(CONTROL_NAMES, point.controls, strict=True)
+        )
+        self.get_logger().info(f"{self.aircraft.name} trimmed with [deg] {angles}")
+        return simulation
 
     def _trim(self, airspeed: float, climb_rate: float, sideslip: float, turn_rate: float) -> TrimPoint:
         """Trim that can be flown: every control within its limits."""
@@ -103,53 +103,48 @@ class Simulator(Node):
             raise TrimError("this flight needs " + "; ".join(point.beyond_limits))
         return point
 
-    @property
-    def time(self) -> float:
-        """Simulation time [s]."""
-        return self._loop.time
-
     # ----------------------------------------------------------------------------------------------------- inputs
 
     def _on_swashplate(self, message: SwashplateArray) -> None:
         try:
-            self._loop.command(swashplate_array(message))
+            self.loop.command(swashplate_array(message))
         except SbsError as error:
             self._outputs.count_rejection(str(error))
             self.get_logger().warning(f"swashplate rejected: {error}", throttle_duration_sec=COMPLAINT_PERIOD)
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         done = "paused" if request.data else "playing"
-        return self._answer(response, lambda: self._loop.pause(request.data), done)
+        return self._answer(response, lambda: self.loop.pause(request.data), done)
 
     def _on_step(self, request: Step.Request, response: Step.Response) -> Step.Response:
         def step() -> None:
-            response.sim_time = self._loop.step(request.ticks)
+            response.sim_time = self.loop.step(request.ticks)
 
         return self._answer(response, step, f"{request.ticks} ticks")
 
     def _on_reset(self, request: Reset.Request, response: Reset.Response) -> Reset.Response:
         def reset() -> None:
             if request.from_state:
-                self._loop.reset(request.state, self._loop.swashplate())
+                self.loop.reset(request.state, self.loop.swashplate())
                 return
             point = self._trim(request.airspeed, request.climb_rate, request.sideslip, request.turn_rate)
-            wind = self._loop.wind().velocity
+            wind = self.loop.wind().velocity
             position = point_array(request.position)
             state = trimmed_state(self.aircraft, point, position, request.heading, wind)
-            self._loop.reset(state, point.swashplate)
+            self.loop.reset(state, point.swashplate)
 
         return self._answer(response, reset, "reset")
 
     def _on_set_wind(self, request: SetWind.Request, response: SetWind.Response) -> SetWind.Response:
-        return self._answer(response, lambda: self._loop.set_wind(lambda now: wind_of(request, now)), "wind set")
+        return self._answer(response, lambda: self.loop.set_wind(lambda now: wind_of(request, now)), "wind set")
 
     def _on_parameters(self, parameters: list[Any]) -> SetParametersResult:
         try:
             for parameter in parameters:
                 if parameter.name == "real_time_factor":
-                    self._loop.set_pace(parameter.value)
+                    self.loop.set_pace(parameter.value)
                 elif parameter.name == "command_timeout":
-                    self._loop.set_command_timeout(parameter.value)
+                    self.loop.set_command_timeout(parameter.value)
         except SbsError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -167,9 +162,12 @@ class Simulator(Node):
             response.success, response.message = True, done
         return response
 
+    def stop(self) -> None:
+        """End the flight; whoever waits for it is told so."""
+        self.loop.stop()
+
     def destroy_node(self) -> None:
-        """End the flight and the publishing, then the node."""
-        self._loop.stop()
+        """End the publishing, then the node."""
         self._outputs.join()
         super().destroy_node()
 
@@ -180,21 +178,20 @@ def checked_components(names: list[str]) -> tuple[str, ...]:
     Raises
     ------
     SbsError
-        Naming the one that is not.
+        One is unknown, or the simulator itself is not among them.
     """
-    unknown = [name for name in names if name not in COMPONENTS]
-    if unknown or not names:
-        raise SbsError(f"parameter components = {list(names)}: allowed are {', '.join(COMPONENTS)}")
+    if "simulator" not in names or set(names) - set(COMPONENTS):
+        raise SbsError(f"parameter components = {list(names)}: allowed are simulator, alone or with control_mixer")
     return tuple(names)
 
 
-def _nodes() -> list[Node]:
+def _nodes() -> list[Component]:
     simulator = Simulator()
     if "control_mixer" not in simulator.components:
         return [simulator]
-    return [simulator, ControlMixer(now=lambda: simulator.time, aircraft=simulator.aircraft)]
+    return [simulator, ControlMixer(simulator.loop)]
 
 
 def main(args: list[str] | None = None) -> None:
-    """Entry point of the executable `simulator`."""
+    """Fly until interrupted."""
     sys.exit(run(_nodes, args))

@@ -1,0 +1,29 @@
+"""Entry points of the executables.
+
+They import next to nothing, so that Ctrl-C is obeyed at once while the compiled model is still being loaded.
+"""
+
+import os
+import signal
+
+
+def simulator() -> None:
+    """Run the executable `simulator`."""
+    _end_at_once_when_interrupted()
+    from sbs_sim.nodes.simulator import main
+
+    main()
+
+
+def control_mixer() -> None:
+    """Run the executable `control_mixer`."""
+    _end_at_once_when_interrupted()
+    from sbs_sim.nodes.control_mixer import main
+
+    main()
+
+
+def _end_at_once_when_interrupted() -> None:
+    """Until the nodes run there is nothing to be ended in good order: `sbs_sim.nodes.host.run` takes over then."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: os._exit(0))

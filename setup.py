@@ -36,8 +36,8 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "simulator = sbs_sim.executables:simulator",
-            "control_mixer = sbs_sim.executables:control_mixer",
+            "simulator = sbs_sim.nodes.executables:simulator",
+            "control_mixer = sbs_sim.nodes.executables:control_mixer",
         ],
     },
 )

@@ -440,7 +440,7 @@ def test_a_small_rotor_that_points_sideways_does_not_mislead_the_trim(sbs, hover
     data = aircraft_data()
     side = {"shaft_direction": [0.0, 1.0, 0.0], "hub": [-1.2, 0.0, 0.0], "radius": 0.12, "hinge_offset": 0.02}
     side |= {"blade_mass": 0.01, "blade_cg": 0.05, "flap_hinge_offset": 0.0, "flap_spring": 20.0, "name": "tail"}
-    data["rotors"].append({**data["rotors"][0], **side, "mixing": dict.fromkeys(data["rotors"][0]["mixing"], {})})
+    data["rotors"].append({**data["rotors"][0], **side, "mixing": {angle: {} for angle in data["rotors"][0]["mixing"]}})
     point = trim(Aircraft.from_dict(data))
     assert point.beyond_limits == ()
     assert point.controls[0] == pytest.approx(hover.controls[0], abs=math.radians(0.5))

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 1e-11  # of the scaled residual: accelerations over gravity, rotor rates over those of a revolution
 MOST_ITERATIONS = 30
+IDLE_LOADINGS = (0.01, 0.1, 1.0)  # disc loadings to try on rotors that do not lift, as shares of that of those that do
 SMALLEST_PATH_STEP = 1.0 / 64.0
 ATTITUDE_UNKNOWNS, CONTROL_UNKNOWNS = 2, 4
 BODY_UNKNOWNS = ATTITUDE_UNKNOWNS + CONTROL_UNKNOWNS
@@ -203,15 +204,19 @@ class _TrimProblem:
             scales[self.layout.inflow(j)] = rotor.speed
         return scales[self._equations]
 
-    def first_guess(self) -> Array:
-        """Hover by momentum theory: the weight on the rotors that point up, a collective right to a few degrees."""
+    def first_guess(self, idle: float) -> Array:
+        """Hover by momentum theory: the weight on the rotors that point up, a collective right to a few degrees.
+
+        A rotor that does not point up gets the inflow of a share `idle` of that disc loading: where it has none at
+        all, its flow through the disc vanishes and so does Newton's sense of direction.
+        """
         aircraft, air = self.aircraft, self.aircraft.environment
         x = np.zeros(self.layout.size)
         upward = [max(0.0, hub_axes(rotor.shaft_direction)[2, 2]) for rotor in aircraft.rotors]
         lifting = sum(math.pi * rotor.radius**2 * up for rotor, up in zip(aircraft.rotors, upward, strict=True))
         loading = aircraft.body.mass * air.gravity / max(lifting, 1e-6)
         for j, (rotor, up) in enumerate(zip(aircraft.rotors, upward, strict=True)):
-            induced = math.sqrt(up * loading / (2 * max(air.air_density, 1e-3)))
+            induced = math.sqrt(max(up, idle) * loading / (2 * max(air.air_density, 1e-3)))
             x[self.layout.inflow(j).start] = induced / (rotor.speed * rotor.radius)
         return np.concatenate([[0.0, 0.0, math.radians(9.0), 0.0, 0.0, 0.0], x[self._places]])
 
@@ -278,7 +283,7 @@ def _follow_path(problem: _TrimProblem, condition: TrimCondition) -> tuple[Array
     A direct solution beyond the limits of the controls may lie on another branch (a stalled rotor can carry the
     aircraft too), so it counts only where the path, which keeps to the branch of hover, ends.
     """
-    hover, iterations = _newton(problem, condition.scaled(0.0), problem.first_guess())
+    hover, iterations = _hover(problem, condition.scaled(0.0))
     direct = None
     try:
         direct, more = _newton(problem, condition, hover)
@@ -294,6 +299,23 @@ def _follow_path(problem: _TrimProblem, condition: TrimCondition) -> tuple[Array
             raise
         return direct, iterations
     return solution, iterations + more
+
+
+def _hover(problem: _TrimProblem, condition: TrimCondition) -> tuple[Array, int]:
+    """Solve hover from several guesses until one leads to a flight within the limits; else the first that was found."""
+    found: list[tuple[Array, int]] = []
+    failure: TrimError | None = None
+    for idle in IDLE_LOADINGS:
+        try:
+            found.append(_newton(problem, condition, problem.first_guess(idle)))
+        except TrimError as error:
+            failure = failure or error
+            continue
+        if not problem.point(condition, found[-1][0], 0).beyond_limits:
+            return found[-1]
+    if found:
+        return found[0]
+    raise failure or TrimError("no guess for hover")
 
 
 def _walk(problem: _TrimProblem, condition: TrimCondition, hover: Array) -> tuple[Array, int]:

@@ -13,17 +13,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
+    from sbs_sim.analysis.linearize import LinearModel, linearize
     from sbs_sim.analysis.trim import TrimPoint, trim
     from sbs_sim.simulation import Simulation, simulate
 
 _HOME = {
     "Aircraft": "sbs_sim.aircraft",
+    "LinearModel": "sbs_sim.analysis.linearize",
+    "linearize": "sbs_sim.analysis.linearize",
     "TrimPoint": "sbs_sim.analysis.trim",
     "trim": "sbs_sim.analysis.trim",
     "Simulation": "sbs_sim.simulation",
     "simulate": "sbs_sim.simulation",
 }
-__all__ = ["Aircraft", "Simulation", "TrimPoint", "simulate", "trim"]
+__all__ = ["Aircraft", "LinearModel", "Simulation", "TrimPoint", "linearize", "simulate", "trim"]
 
 
 def __getattr__(name: str) -> Any:

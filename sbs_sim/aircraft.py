@@ -4,9 +4,11 @@ The keys of a file, their types and plain ranges are in config/aircraft.schema.j
 concerns several values at once is checked here.
 """
 
+import hashlib
 import json
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -235,6 +237,15 @@ class Aircraft:
     def layout(self) -> StateLayout:
         """Places and names of the states of this aircraft."""
         return StateLayout(tuple(rotor.blades for rotor in self.rotors))
+
+    @cached_property
+    def parameter_hash(self) -> str:
+        """SHA-256 over everything that the model takes from the aircraft file: equal for equal physics."""
+        digest = hashlib.sha256()
+        arrays = [*self.params(), *(rotor.mixing for rotor in self.rotors)]
+        for values in arrays:
+            digest.update(f"{values.shape}{values.dtype.str}".encode() + values.tobytes())
+        return digest.hexdigest()
 
     def mix(self, controls: Array) -> Array:
         """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls [rad], shape (4,)."""

@@ -17,5 +17,9 @@ class TrimError(SbsError):
     """No equilibrium was found for a flight condition."""
 
 
+class LinearizationError(SbsError):
+    """A linear model that cannot be made."""
+
+
 class SimulationError(SbsError):
     """A simulation that cannot start or cannot go on."""

@@ -43,7 +43,7 @@ def cache_folder() -> Path:
     A folder named after the content of all of them can never hold stale physics.
     """
     here = Path(__file__).parent
-    sources = sorted([*here.glob("*.py"), *(here.parent / "analysis").glob("*.py")])
+    sources = sorted(here.glob("*.py"))
     digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:16]
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:

@@ -12,6 +12,7 @@ linear state, 8 + 4 n_blades + 3 n_rotors values (38 for two three-bladed rotors
 Flap and lag are multiblade coordinates (MODEL.md section 1), inflow is lambda0, lambdas, lambdac per rotor.
 """
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -25,11 +26,17 @@ Array = NDArray[np.float64]
 POSITION, ATTITUDE, VELOCITY, RATES = 0, 3, 7, 10  # first index of each part of the simulation state
 BODY_SIZE = 13
 LINEAR_BODY_SIZE = 8
+LINEAR_U, LINEAR_W, LINEAR_Q, LINEAR_THETA, LINEAR_V, LINEAR_P, LINEAR_PHI, LINEAR_R = range(LINEAR_BODY_SIZE)
 LINEAR_BODY_NAMES = ("u", "w", "q", "theta", "v", "p", "phi", "r")
 LINEAR_BODY_UNITS = ("m/s", "m/s", "rad/s", "rad", "m/s", "rad/s", "rad", "rad/s")
 CONTROL_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")
 SWASHPLATE_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic")
 INFLOW_NAMES = ("lambda0", "lambdas", "lambdac")
+
+_ROTOR_STATE = re.compile(
+    r"(?P<rate>d?)(?:[ab](?P<flap>\d+|d)|xi(?P<lag>0|d|\d*[cs]))\((?P<rotor>\d+)\)"
+    r"|lambda(?P<inflow>[0sc])\((?P<inflow_rotor>\d+)\)"
+)
 
 
 def multiblade_suffixes(blades: int) -> tuple[str, ...]:
@@ -49,6 +56,55 @@ def multiblade_suffixes(blades: int) -> tuple[str, ...]:
     for harmonic in range(2, (blades - 1) // 2 + 1):
         names += [f"{harmonic}c", f"{harmonic}s"]
     return tuple(names + ["d"] if blades % 2 == 0 else names)
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a linear state belongs to, known from its name.
+
+    Attributes
+    ----------
+    family : str
+        "body", "flap", "lag" or "inflow".
+    harmonic : int
+        0 for body states and collective coordinates, n for the nth harmonic, -1 for the differential coordinate.
+    rotor : int
+        Index of the rotor, -1 for the body.
+    is_rate : bool
+        True for the rate of a flap or lag coordinate.
+    """
+
+    family: str
+    harmonic: int
+    rotor: int
+    is_rate: bool = False
+
+
+def part_of(name: str) -> Part:
+    """Part that a linear state belongs to.
+
+    Parameters
+    ----------
+    name : str
+        One of `StateLayout.linear_names`.
+
+    Raises
+    ------
+    ValueError
+        No linear state has this name.
+    """
+    if name in LINEAR_BODY_NAMES:
+        return Part("body", 0, -1)
+    match = _ROTOR_STATE.fullmatch(name)
+    if match is None:
+        raise ValueError(f"no linear state is called {name!r}")
+    rotor = int(match["rotor"] or match["inflow_rotor"]) - 1
+    if match["inflow"]:
+        return Part("inflow", 0 if match["inflow"] == "0" else 1, rotor)
+    if match["lag"]:
+        digits = match["lag"].rstrip("cs") or "1"
+        return Part("lag", -1 if digits == "d" else int(digits), rotor, bool(match["rate"]))
+    return Part("flap", -1 if match["flap"] == "d" else int(match["flap"]), rotor, bool(match["rate"]))
 
 
 @dataclass(frozen=True)

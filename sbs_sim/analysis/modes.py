@@ -94,7 +94,8 @@ def modes(a: Array, state_names: Sequence[str]) -> tuple[Mode, ...]:
     ValueError
         A name that no linear state has, or not one name for each state.
     """
-    found, parts = _unnamed(a, state_names), _parts(a, state_names)
+    parts = _parts(a, state_names)
+    found = _unnamed(a, state_names)
     groups = _groups(parts, state_names)
     members: dict[str, list[Mode]] = defaultdict(list)
     for mode, group in zip(found, _assign(found, groups), strict=True):
@@ -106,7 +107,7 @@ def modes(a: Array, state_names: Sequence[str]) -> tuple[Mode, ...]:
         elif group == "lateral":
             named += _name_lateral(inside, state_names)
         else:
-            named += _name_rotor(inside, parts, groups[group])
+            named += _name_rotor(inside, parts, state_names, groups[group])
     return tuple(sorted(_unique(named), key=lambda mode: (mode.frequency, mode.name)))
 
 
@@ -267,10 +268,13 @@ def _name_lateral(inside: list[Mode], state_names: Sequence[str]) -> list[Mode]:
 # --- names of the rotors' modes ---------------------------------------------------------------------------------
 
 
-def _name_rotor(inside: list[Mode], parts: Sequence[Part], states: list[int]) -> list[Mode]:
+def _name_rotor(
+    inside: list[Mode], parts: Sequence[Part], state_names: Sequence[str], states: list[int]
+) -> list[Mode]:
     """Names of the modes of one family and harmonic, with what several rotors do together."""
     family, harmonic = parts[states[0]].family, parts[states[0]].harmonic
     rotors = sorted({parts[i].rotor for i in states})
+    states = sorted(states, key=lambda i: state_names[i])  # so that the rotors' coordinates stand in one order
     by_owner: dict[str, list[Mode]] = defaultdict(list)
     for mode in inside:
         by_owner[_owner(mode, parts, states, rotors)].append(mode)
@@ -278,7 +282,8 @@ def _name_rotor(inside: list[Mode], parts: Sequence[Part], states: list[int]) ->
     for owner, own in by_owner.items():
         base = [replace(mode, name=_family_name(family, harmonic)) for mode in own]
         if family != "inflow" and harmonic > 0:
-            base = _rank(base, base[0].name, tuple(f"{way} {base[0].name}" for way in ("regressing", "advancing")))
+            name = base[0].name
+            base = _rank(base, name, (f"regressing {name}", f"advancing {name}"))
         for mode in base:
             suffix = owner if owner != "together" else _symmetry(mode, parts, states, rotors)
             named.append(replace(mode, name=f"{mode.name}{suffix}"))

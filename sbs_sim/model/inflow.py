@@ -6,7 +6,7 @@ D. A. Peters, N. HaQuang: Dynamic inflow for practical applications, J. AHS 33 (
 
 import math
 
-from sbs_sim.model.kernel import kernel
+from sbs_sim.model.kernel import entry, kernel
 
 APPARENT_MASS = 8.0 / (3.0 * math.pi)
 APPARENT_INERTIA = 16.0 / (45.0 * math.pi)
@@ -24,16 +24,41 @@ def inflow_rates(lambda0, lambdas, lambdac, mu_x, mu_y, mu_z, sense, duct, speed
     ratio a_w. thrust, sine, cosine: C_T and the coefficients m_s, m_c of the aerodynamic moments, where more lift
     aft (psi = 0) gives more inflow aft. cyclic: 0 holds lambdas and lambdac.
     """
+    flow, flow_cyclic, xc, xs = _flow(lambda0, mu_x, mu_y, mu_z, sense)
+    return _rates(lambda0, lambdas, lambdac, flow, flow_cyclic, xc, xs, duct, speed, thrust, sine, cosine, cyclic)
+
+
+@entry
+def inflow_matrix(lambda0, mu_x, mu_y, mu_z, sense, duct, speed, cyclic, out):
+    """C^lambda of lambda' = C^lambda lambda + E^lambda (paper, appendix B): the flow through the disc is held.
+
+    Parameters are those of `inflow_rates`; out, shape (3, 3), is in the order lambda0, lambdas, lambdac [1/s].
+    """
+    flow, flow_cyclic, xc, xs = _flow(lambda0, mu_x, mu_y, mu_z, sense)
+    for i in range(3):
+        l0, ls, lc = 1.0 * (i == 0), 1.0 * (i == 1), 1.0 * (i == 2)
+        out[0, i], out[1, i], out[2, i] = _rates(
+            l0, ls, lc, flow, flow_cyclic, xc, xs, duct, speed, 0.0, 0.0, 0.0, cyclic
+        )
+
+
+@kernel
+def _flow(lambda0, mu_x, mu_y, mu_z, sense):
+    """V_T, V_m and the skew of the wake along x and y, all of the present flow through the disc."""
     lam = lambda0 - mu_z
     mu_squared = mu_x * mu_x + mu_y * mu_y
     flow = math.sqrt(mu_squared + lam * lam + LEAST_FLOW * LEAST_FLOW)
+    flow_cyclic = (mu_squared + lam * (lam + lambda0)) / flow
+    denominator = flow + abs(lam)
+    return flow, flow_cyclic, mu_x / denominator, -sense * mu_y / denominator
+
+
+@kernel
+def _rates(lambda0, lambdas, lambdac, flow, flow_cyclic, xc, xs, duct, speed, thrust, sine, cosine, cyclic):
+    """Rates of the inflow states [1/s], linear in them and in the loads."""
     l11 = 2.0 * duct * duct
     if cyclic == 0:
         return speed * (thrust - flow * lambda0 / l11) / APPARENT_MASS, 0.0, 0.0
-    flow_cyclic = (mu_squared + lam * (lam + lambda0)) / flow
-    denominator = flow + abs(lam)
-    xc = mu_x / denominator
-    xs = -sense * mu_y / denominator
     y0, yc, ys = _solve_gain(l11, xc, xs, lambda0, lambdac, lambdas)
     return (
         speed * (thrust - flow * y0) / APPARENT_MASS,

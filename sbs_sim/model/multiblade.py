@@ -15,15 +15,29 @@ from sbs_sim.model.kernel import kernel
 Array = NDArray[np.float64]
 
 
-def blade_matrix(blades: int, azimuth: float) -> Array:
-    """T with blade angles = T @ coordinates, shape (blades, blades), the first blade at `azimuth` [rad]."""
-    columns: list[NDArray[Any]] = [np.ones(blades)]
-    psi = azimuth + 2 * math.pi * np.arange(blades) / blades
+def blade_matrix(blades: int, azimuth: float | Array, order: int = 0) -> Array:
+    """T with blade angles = T @ coordinates, or its derivative by the azimuth.
+
+    Parameters
+    ----------
+    blades : int
+    azimuth : float or ndarray, shape (...)
+        Of the first blade [rad].
+    order : int
+        0 for T itself, 1 and 2 for its first and second derivative.
+
+    Returns
+    -------
+    ndarray, shape (..., blades, blades)
+    """
+    psi = np.asarray(azimuth)[..., None] + 2 * math.pi * np.arange(blades) / blades
+    columns: list[NDArray[Any]] = [np.full_like(psi, order == 0)]
     for harmonic in range(1, (blades - 1) // 2 + 1):
-        columns += [-np.cos(harmonic * psi), -np.sin(harmonic * psi)]
+        angle = harmonic * psi + order * math.pi / 2
+        columns += [-(harmonic**order) * np.cos(angle), -(harmonic**order) * np.sin(angle)]
     if blades % 2 == 0:
-        columns.append((-1.0) ** np.arange(blades))
-    return np.stack(columns, axis=1)
+        columns.append(np.full_like(psi, order == 0) * (-1.0) ** np.arange(blades))
+    return np.stack(columns, axis=-1)
 
 
 @kernel

@@ -1,0 +1,139 @@
+"""Floquet check of a time-invariant model (theory.md section 9).
+
+In multiblade coordinates the model linearized about a trimmed state is periodic with the passage of the blades. The
+eigenvalues of its monodromy matrix over one passage are exp(exponent x period); averaging over the azimuth is fair
+where the exponents are the poles of the averaged model. (G. Floquet 1883; D. A. Peters, K. H. Hohenemser, Application
+of the Floquet transition matrix to problems of lifting rotor stability, J. AHS 16 (2), 1971.)
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.linearize import difference_steps, jacobians, used_states
+from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim.errors import LinearizationError
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+MOST_PASSAGES = 60  # of any rotor in one common period
+AZIMUTH_COUNTS = (8, 1000)
+
+
+@dataclass(frozen=True)
+class Floquet:
+    """Characteristic exponents beside the poles of the averaged model.
+
+    Attributes
+    ----------
+    period : float
+        Of the periodic model [s].
+    monodromy : ndarray, shape (n, n)
+        Transition over one period.
+    multipliers : ndarray of complex, shape (n,)
+        Eigenvalues of the monodromy matrix.
+    exponents : ndarray of complex, shape (n,)
+        log(multiplier) / period [rad/s], on the branch next to the pole of the averaged model.
+    poles : ndarray of complex, shape (n,)
+        Of the averaged model [rad/s], slowest first, each beside its exponent.
+    """
+
+    period: float
+    monodromy: Array
+    multipliers: ComplexArray
+    exponents: ComplexArray
+    poles: ComplexArray
+
+    @property
+    def difference(self) -> Array:
+        """|exponent - pole| / |pole|, shape (n,)."""
+        return np.abs(self.exponents - self.poles) / np.maximum(np.abs(self.poles), np.finfo(float).tiny)
+
+
+def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Floquet:
+    """Integrate the periodic linear model over one period.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    point : TrimPoint
+        The mean state about which is linearized.
+    azimuth_count : int
+        Number of instants of one period at which the model is linearized, even, 8 to 1000; two make a step of the
+        classical Runge-Kutta method.
+
+    Returns
+    -------
+    Floquet
+
+    Raises
+    ------
+    LinearizationError
+        A count out of range, or rotors whose blade passages have no common period.
+    """
+    least, most = AZIMUTH_COUNTS
+    if not least <= azimuth_count <= most or azimuth_count % 2:
+        raise LinearizationError(f"azimuth_count = {azimuth_count}: allowed are even numbers from {least} to {most}")
+    period, _ = common_period(aircraft)
+    times = period * np.arange(azimuth_count) / azimuth_count
+    psi = times[:, None] * np.array([rotor.speed for rotor in aircraft.rotors])
+    used = used_states(point)
+    a = jacobians(aircraft, point, psi, difference_steps(aircraft))[:, used][:, :, used]
+    monodromy = _transition(a, period)
+    multipliers = np.linalg.eigvals(monodromy).astype(complex)
+    poles = np.linalg.eigvals(a.mean(axis=0)).astype(complex)
+    poles = poles[np.lexsort((poles.imag, np.abs(poles)))]
+    multipliers, exponents = _beside(poles, multipliers, period)
+    return Floquet(period, monodromy, multipliers, exponents, poles)
+
+
+def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
+    """Shortest time in which every rotor passes a whole number of blades [s], and those numbers.
+
+    The differential coordinate of an even number of blades changes its sign with every blade: such a rotor passes an
+    even number.
+
+    Raises
+    ------
+    LinearizationError
+        There is none of at most 60 passages.
+    """
+    blades = np.array([rotor.blades for rotor in aircraft.rotors])
+    each = np.where(blades % 2 == 0, 2, 1)
+    passage = each * 2.0 * math.pi / (blades * np.array([rotor.speed for rotor in aircraft.rotors]))
+    for count in range(1, MOST_PASSAGES + 1):
+        period = count * float(passage.max())
+        numbers = np.round(period / passage)
+        if np.all(np.abs(numbers * passage - period) < 1e-9 * period):
+            return period, [int(number) for number in numbers * each]
+    raise LinearizationError(f"the blade passages of the rotors have no common period of up to {MOST_PASSAGES} of them")
+
+
+def _transition(a: Array, period: float) -> Array:
+    """Transition matrix over a period with the instants of a; x' = A(t) x by the classical Runge-Kutta method."""
+    n = a.shape[1]
+    x, h = np.eye(n), 2.0 * period / len(a)
+    for i in range(0, len(a), 2):
+        first, middle, last = a[i], a[i + 1], a[(i + 2) % len(a)]
+        k1 = first @ x
+        k2 = middle @ (x + 0.5 * h * k1)
+        k3 = middle @ (x + 0.5 * h * k2)
+        k4 = last @ (x + h * k3)
+        x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    return x
+
+
+def _beside(poles: ComplexArray, multipliers: ComplexArray, period: float) -> tuple[ComplexArray, ComplexArray]:
+    """Multipliers and exponents in the order of the poles; a logarithm has many branches, the nearest is taken."""
+    from scipy.optimize import linear_sum_assignment
+
+    principal = np.log(multipliers) / period
+    turn = 2.0 * math.pi / period
+    branch = np.round((poles[:, None].imag - principal.imag) / turn)
+    exponents = principal + 1j * turn * branch
+    _, order = linear_sum_assignment(np.abs(exponents - poles[:, None]))
+    return multipliers[order], exponents[np.arange(len(poles)), order]

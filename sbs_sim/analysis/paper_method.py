@@ -1,0 +1,246 @@
+"""The paper's construction of A and B, term by term (eqs. [20] to [34]; theory.md section 9).
+
+Forces, moments and forcing terms become Taylor series by central differences, eq. [21]; what turning axes and gravity
+give is written down. The same physics as the averaged method on another way: both must agree to rounding of the
+differences.
+
+Of the rotor equations [13] and [14], K0 and K1 are constant, C0 and C1 hold the Coriolis coupling of flap and lag,
+and E is what the model has beyond them. Of the inflow equations C^lambda is the gain at the present flow through the
+disc. Rates of the coordinates vanish at trim, so derivatives of C1 do not appear.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.aircraft import Aircraft, Rotor
+from sbs_sim.analysis.linearize import azimuths, kinematics, used_states
+from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim.model import params as P
+from sbs_sim.model import state as S
+from sbs_sim.model.average import averaged_derivative
+from sbs_sim.model.frames import rotation_matrix
+from sbs_sim.model.inflow import inflow_matrix
+from sbs_sim.model.multiblade import blade_matrix
+
+Array = NDArray[np.float64]
+
+AXES = ([S.LINEAR_U, S.LINEAR_V, S.LINEAR_W], [S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R])  # velocity, rates
+
+
+def blocks(aircraft: Aircraft, point: TrimPoint, steps: Array) -> dict[str, Array]:
+    """Matrices of the paper's construction.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    point : TrimPoint
+    steps : ndarray, shape (linear_size + 4,)
+        Half the distance of the differences.
+
+    Returns
+    -------
+    dict of str to ndarray
+        "A" (n, n), "B" (n, m); the nine blocks of eq. [22], "A_B-B" to "A_lambda-lambda" (rows are B the body, R flap,
+        flap rates, lag, lag rates, lambda the inflow); "K0_beta", "K1_beta", "C0_beta", "C1_beta" and the same for xi
+        at trim, block diagonal over the rotors; "A_R_first" (the first matrix of eq. [32], over the rotor states, with
+        its last row in the order of eq. [14]), "A_R_second" (the second, over all states); "C_lambda" (C^lambda at
+        trim), "A_lambda_second"; "A_quasi_static" (8, 8), rotor and inflow settled.
+    """
+    taylor = _TaylorTerms(aircraft, point)
+    size = len(point.state)
+    used = used_states(point)
+    inputs = [*used, *range(size, size + len(point.controls))]
+    slopes = taylor.slopes(steps, inputs)
+    first = taylor.first_matrix()
+    gain = taylor.inflow_gain(point.state)
+    full = slopes.copy()
+    full[: S.LINEAR_BODY_SIZE, : S.LINEAR_BODY_SIZE] += kinematics(
+        point.state, aircraft.body.inertia, aircraft.environment.gravity
+    )
+    rotor, inflow = slice(S.LINEAR_BODY_SIZE, taylor.inflow_start), slice(taylor.inflow_start, size)
+    full[rotor, rotor] += first
+    full[inflow, inflow] += gain
+    found = {"A": full[np.ix_(used, used)], "B": full[used, size:]}
+    places = {"B": used[used < rotor.start], "lambda": used[used >= inflow.start]}
+    places["R"] = np.setdiff1d(used, [*places["B"], *places["lambda"]])
+    for row in ("B", "R", "lambda"):
+        for column in ("B", "R", "lambda"):
+            found[f"A_{row}-{column}"] = full[np.ix_(places[row], places[column])]
+    found |= taylor.coupling_blocks()
+    inside = places["R"] - rotor.start
+    found["A_R_first"] = first[np.ix_(inside, inside)]
+    found["A_R_second"] = slopes[np.ix_(places["R"], used)]
+    within = places["lambda"] - inflow.start
+    found["C_lambda"] = gain[np.ix_(within, within)]
+    found["A_lambda_second"] = slopes[np.ix_(places["lambda"], used)]
+    found["A_quasi_static"] = _settled(found["A"])
+    return found
+
+
+def _settled(a: Array) -> Array:
+    """A_ss - A_sf A_ff^-1 A_fs over the body states, which come first."""
+    n = S.LINEAR_BODY_SIZE
+    return a[:n, :n] - a[:n, n:] @ np.linalg.solve(a[n:, n:], a[n:, :n])
+
+
+class _TaylorTerms:
+    """What eqs. [13], [14], [16] and the inflow equations expand: all by the linear state and the controls."""
+
+    def __init__(self, aircraft: Aircraft, point: TrimPoint) -> None:
+        self.aircraft, self.point, self.layout = aircraft, point, aircraft.layout
+        self.trim = np.concatenate([point.state, point.controls])
+        self.inflow_start = S.LINEAR_BODY_SIZE + 4 * self.layout.blade_count
+        self._params = aircraft.params(point.lead_lag, point.cyclic_inflow)
+        self._work = P.make_work(self._params)
+        self._psi = azimuths(aircraft, point.azimuth_count)
+        self._dx = np.zeros(self.layout.size)
+        self._loads = np.zeros((len(aircraft.rotors), P.LOAD_SIZE))
+
+    def _places(self, rotor: int) -> list[slice]:
+        """Places of one rotor's flap, flap rates, lag, lag rates in the linear state."""
+        shift = S.LINEAR_BODY_SIZE - S.BODY_SIZE
+        found = (self.layout.flap, self.layout.flap_rate, self.layout.lag, self.layout.lag_rate)
+        return [slice(where(rotor).start + shift, where(rotor).stop + shift) for where in found]
+
+    def _inflow_place(self, rotor: int) -> slice:
+        return slice(self.inflow_start + 3 * rotor, self.inflow_start + 3 * rotor + 3)
+
+    def slopes(self, steps: Array, inputs: Sequence[int]) -> Array:
+        """Central differences, eq. [21], of `expanded`; shape (linear_size, linear_size + 4)."""
+        result = np.zeros((self.layout.linear_size, len(self.trim)))
+        for i in inputs:
+            forward, backward = self.trim.copy(), self.trim.copy()
+            forward[i] += steps[i]
+            backward[i] -= steps[i]
+            result[:, i] = (self.expanded(forward) - self.expanded(backward)) / (2 * steps[i])
+        return result
+
+    def expanded(self, inputs: Array) -> Array:
+        """F/m, I^-1 M, C0 xi0 + E of flap, C0 beta0 + E of lag, C^lambda lambda0 + E, in the places of the linear state."""
+        state, rates = inputs[: self.layout.linear_size], self._rates(inputs)
+        result = np.zeros(self.layout.linear_size)
+        self._expand_body(state, rates, result)
+        for j, rotor in enumerate(self.aircraft.rotors):
+            flap, flap_rate, lag, lag_rate = self._places(j)
+            k0, k1 = self._turning(rotor)
+            c0b, c1b, c0x, c1x = self._coupling(j, state[flap])
+            beta, dbeta, xi, dxi = state[flap], state[flap_rate], state[lag], state[lag_rate]
+            forcing = rates[flap_rate] + k1 @ dbeta + k0 @ beta - c1b @ dxi - c0b @ xi
+            result[flap_rate] = c0b @ self.trim[lag] + forcing
+            if self.point.lead_lag:
+                forcing = rates[lag_rate] + k1 @ dxi + k0 @ xi - c1x @ dbeta - c0x @ beta
+                result[lag_rate] = c0x @ self.trim[flap] + forcing
+        inflow = slice(self.inflow_start, None)
+        gain = self.inflow_gain(state)
+        forcing = rates[inflow] - gain @ state[inflow]
+        result[inflow] = gain @ self.trim[: len(state)][inflow] + forcing
+        return result
+
+    def _rates(self, inputs: Array) -> Array:
+        """Mean rates of the linear state; those of the attitude are left out, as they hold no load."""
+        x = self.layout.from_linear(inputs[: self.layout.linear_size])
+        swash = self.aircraft.mix(inputs[self.layout.linear_size :])
+        count = self.point.azimuth_count
+        averaged_derivative(self._params, x, swash, count, np.zeros(3), self._work, self._dx, self._loads)
+        u, v, w, p, q, r = self._dx[S.VELOCITY : S.BODY_SIZE]
+        return np.concatenate([[u, w, q, 0.0, v, p, 0.0, r], self._dx[S.BODY_SIZE :]])
+
+    def _expand_body(self, state: Array, rates: Array, result: Array) -> None:
+        """Newton-Euler, eq. [16]: F/m = U' + om x U - g, I^-1 M = om' + I^-1 (om x I om)."""
+        inertia, gravity = self.aircraft.body.inertia, self.aircraft.environment.gravity
+        velocity, om = state[AXES[0]], state[AXES[1]]
+        attitude = self.layout.from_linear(state)[S.ATTITUDE : S.VELOCITY]
+        weight = gravity * rotation_matrix(attitude)[2]
+        result[AXES[0]] = rates[AXES[0]] + np.cross(om, velocity) - weight
+        result[AXES[1]] = rates[AXES[1]] + np.linalg.solve(inertia, np.cross(om, inertia @ om))
+
+    def _turning(self, rotor: Rotor) -> tuple[Array, Array]:
+        """K0 and K1 of one rotor, eqs. [26] and [27]; they do not depend on the azimuth."""
+        to_blades = blade_matrix(rotor.blades, 0.0)
+        k0 = rotor.speed**2 * np.linalg.solve(to_blades, blade_matrix(rotor.blades, 0.0, 2))
+        k1 = 2 * rotor.speed * np.linalg.solve(to_blades, blade_matrix(rotor.blades, 0.0, 1))
+        return k0, k1
+
+    def _coupling(self, j: int, flap: Array) -> tuple[Array, Array, Array, Array]:
+        """C0, C1 of flap and C0, C1 of lag of one rotor, eqs. [28] to [31], averaged over the azimuth.
+
+        D^beta = -2 Omega (A1 cos beta + e_F S1) sin beta = -D^xi (theory.md section 3). The paper's reading has A1
+        alone in it, which is what its Table 5 shows.
+        """
+        rotor, row = self.aircraft.rotors[j], self._params.rotor[j]
+        if not self.point.lead_lag:
+            none = np.zeros((rotor.blades, rotor.blades))
+            return none, none, none, none
+        offset = 0.0 if self.aircraft.options.hub_moment == "paper" else row[P.FLAP_HINGE] * row[P.S1]
+        to_blades = blade_matrix(rotor.blades, self._psi[:, j])
+        turned = rotor.speed * blade_matrix(rotor.blades, self._psi[:, j], 1)
+        beta = to_blades @ flap
+        d = -2 * rotor.speed * (row[P.A1] * np.cos(beta) + offset) * np.sin(beta)
+        a2 = row[P.BLADE_MASS] * row[P.FLAP_HINGE] ** 2 + 2 * row[P.FLAP_HINGE] * row[P.S1] * np.cos(beta)
+        a2 += row[P.A1] * np.cos(beta) ** 2
+        back = np.linalg.inv(to_blades)
+        of_flap, of_lag = back * (-d / row[P.A1])[:, None, :], back * (d / a2)[:, None, :]
+        parts = (of_flap @ turned, of_flap @ to_blades, of_lag @ turned, of_lag @ to_blades)
+        c0b, c1b, c0x, c1x = (part.mean(axis=0) for part in parts)
+        return c0b, c1b, c0x, c1x
+
+    def coupling_blocks(self) -> dict[str, Array]:
+        """K0, K1, C0, C1 of flap and lag at trim, block diagonal over the rotors as eq. [24] writes them."""
+        found: dict[str, Array] = {}
+        n = self.layout.blade_count
+        names = ["K0_beta", "K1_beta"]
+        if self.point.lead_lag:
+            names += ["C0_beta", "C1_beta", "K0_xi", "K1_xi", "C0_xi", "C1_xi"]
+        for name in names:
+            found[name] = np.zeros((n, n))
+        for j, rotor in enumerate(self.aircraft.rotors):
+            flap = self._places(j)[0]
+            k0, k1 = self._turning(rotor)
+            c0b, c1b, c0x, c1x = self._coupling(j, self.trim[flap])
+            place = slice(flap.start - S.LINEAR_BODY_SIZE, flap.stop - S.LINEAR_BODY_SIZE)
+            values = {"K0_beta": k0, "K1_beta": k1, "K0_xi": k0, "K1_xi": k1}
+            values |= {"C0_beta": c0b, "C1_beta": c1b, "C0_xi": c0x, "C1_xi": c1x}
+            for name in names:
+                found[name][place, place] = values[name]
+        return found
+
+    def first_matrix(self) -> Array:
+        """First matrix of eq. [32] over flap, flap rates, lag, lag rates of all rotors.
+
+        Its last row is printed with -K0, -K1 under flap and C0, C1 under lag; eq. [14] has them the other way round,
+        and only that has the spectrum of Table 5.
+        """
+        n = self.layout.blade_count
+        parts = self.coupling_blocks()
+        none, one = np.zeros((n, n)), np.eye(n)
+        rows = [[none, one, none, none], [-parts["K0_beta"], -parts["K1_beta"], none, none]]
+        rows += [[none, none, none, none]] * 2
+        if self.point.lead_lag:
+            rows[1][2:] = parts["C0_beta"], parts["C1_beta"]
+            rows[2] = [none, none, none, one]
+            rows[3] = [parts["C0_xi"], parts["C1_xi"], -parts["K0_xi"], -parts["K1_xi"]]
+        return np.block(rows)
+
+    def inflow_gain(self, state: Array) -> Array:
+        """C^lambda of all rotors in still air, block diagonal as eq. [33] writes it; shape (3 n_rotors, 3 n_rotors)."""
+        result = np.zeros((3 * len(self.aircraft.rotors),) * 2)
+        velocity, om = state[AXES[0]], state[AXES[1]]
+        cyclic = self._params.switches[P.CYCLIC_INFLOW]
+        for j, rotor in enumerate(self.aircraft.rotors):
+            flow = self._params.axes[j].T @ (velocity + np.cross(om, rotor.hub)) / (rotor.speed * rotor.radius)
+            place = self._inflow_place(j)
+            own = np.zeros((3, 3))
+            inflow_matrix(
+                state[place.start],
+                *flow,
+                self._params.rotor[j, P.SENSE],
+                rotor.duct_expansion,
+                rotor.speed,
+                cyclic,
+                own,
+            )
+            within = slice(3 * j, 3 * j + 3)
+            result[within, within] = own
+        return result

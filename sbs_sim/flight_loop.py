@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import Simulation, Snapshot
+from sbs_sim.simulation import Event, Simulation, Snapshot
 
 QUEUE_LENGTH = 100  # snapshots between the flight and their reader: one second at 100 Hz
 HURRY_TICKS = 10  # the schedule is kept by hurrying up to this many ticks; beyond, real time is lost for good
@@ -53,6 +53,8 @@ class Report:
         Why the simulation cannot go on; empty if it can.
     command_timed_out : bool
         The last command is older than the time-out and is being held.
+    events : tuple of Event
+        What acted on the flight since the report before: none is ever lost with a dropped report.
     """
 
     snapshot: Snapshot | None
@@ -64,6 +66,7 @@ class Report:
     dropped: int
     fault: str
     command_timed_out: bool
+    events: tuple[Event, ...] = ()
 
 
 class FlightLoop:
@@ -97,6 +100,7 @@ class FlightLoop:
         self._fault = ""
         self.resets = 0  # read by those who must know that what they commanded before is void
         self._missed = self._dropped = 0
+        self._events = [simulation.beginning()]  # not handed out yet
         # At most the newest command. A deque, for it is emptied and filled by two threads and loses nothing.
         self._commands: collections.deque[np.ndarray] = collections.deque(maxlen=1)
         self._command_time: float | None = None
@@ -287,6 +291,7 @@ class FlightLoop:
         with contextlib.suppress(IndexError):  # there is none
             simulation.swashplate = self._commands.pop()  # checked when it came
             self._command_time = simulation.time
+            self._events.append(Event(simulation.step, "swashplate", swashplate=simulation.swashplate))
         try:
             simulation.advance()
         except SbsError as error:
@@ -316,10 +321,15 @@ class FlightLoop:
             raise SimulationError(f"the simulation has stopped, reset it first: {self._fault}")
 
     def _set_wind(self, make: Callable[[Snapshot], Wind]) -> None:
-        self._simulation.set_wind(make(self._simulation.snapshot()))
+        simulation = self._simulation
+        simulation.set_wind(make(simulation.snapshot()))
+        self._events.append(Event(simulation.step, "wind", wind=simulation.wind))
 
     def _reset(self, state: ArrayLike, swashplate: ArrayLike) -> None:
-        self._simulation.reset(state, swashplate)
+        simulation = self._simulation
+        simulation.reset(state, swashplate)
+        reset = Event(simulation.step, "reset", swashplate=simulation.swashplate, state=simulation.state.copy())
+        self._events.append(reset)
         self.resets += 1
         self._fault = ""
         self._commands.clear()
@@ -344,10 +354,12 @@ class FlightLoop:
             dropped=self._dropped,
             fault=self._fault,
             command_timed_out=self._timeout > 0.0 and age > self._timeout + 1e-9,
+            events=tuple(self._events),
         )
         while True:
             try:
                 self.reports.put(report, block=patient, timeout=0.1)
+                self._events.clear()
                 return
             except queue.Full:
                 if not patient or self._stopping:

@@ -5,9 +5,11 @@ steps. Steps are counted in integers from the start, and time is step x dt, so t
 give the same flight to the last bit.
 """
 
+import collections
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +27,7 @@ from sbs_sim.model.wind import Wind, WindField, wind_at
 
 Array = NDArray[np.float64]
 
+UNIT = 1e-9  # a quaternion whose norm is this near to one is a unit quaternion
 METHODS = {"rk4": RK4, "partitioned": PARTITIONED}
 
 # A tick is one uninterrupted call of compiled code; this many steps take it a tenth of a second.
@@ -71,6 +74,29 @@ class Snapshot:
     azimuth: Array
     loads: Array
     wind: Array
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that acts on a flight between two ticks: all events together repeat it bit for bit, see `refly`.
+
+    Attributes
+    ----------
+    step : int
+        Integration steps before it.
+    kind : str
+        "start" (state, swashplate, wind), "swashplate", "reset" (state, swashplate) or "wind".
+    swashplate : ndarray, shape (n_rotors, 3), or None
+        [rad]
+    state : ndarray, shape (size,), or None
+    wind : Wind or None
+    """
+
+    step: int
+    kind: str
+    swashplate: Array | None = None
+    state: Array | None = None
+    wind: Wind | None = None
 
 
 class Simulation:
@@ -154,6 +180,25 @@ class Simulation:
         """The wind in force."""
         return self._field.wind
 
+    def beginning(self) -> Event:
+        """The present as the start of a flight."""
+        return Event(self.step, "start", self.swashplate.copy(), self.state.copy(), self.wind)
+
+    def act(self, event: Event) -> None:
+        """Let an event act; a start acts as a reset with its wind.
+
+        Raises
+        ------
+        SimulationError
+            See `reset`, `set_swashplate`.
+        """
+        if event.kind in ("start", "reset"):
+            self.reset(event.state, event.swashplate)
+        elif event.swashplate is not None:
+            self.set_swashplate(event.swashplate)
+        if event.wind is not None:
+            self.set_wind(event.wind)
+
     def checked_state(self, state: ArrayLike) -> Array:
         """Copy of a simulation state that is complete, finite and plausible.
 
@@ -174,7 +219,8 @@ class Simulation:
         norm = np.linalg.norm(quaternion)
         if not 0.5 <= norm <= 2.0:
             raise SimulationError(f"state attitude has a norm of {norm:g}: allowed are 0.5 to 2, a unit quaternion")
-        values[S.ATTITUDE : S.ATTITUDE + 4] = quaternion / norm
+        if abs(norm - 1.0) > UNIT:  # what has been normalised once stays as it is, bit for bit
+            values[S.ATTITUDE : S.ATTITUDE + 4] = quaternion / norm
         values[self._held] = 0.0
         return values
 
@@ -264,6 +310,55 @@ class Simulation:
             loads=self._work.loads.copy(),
             wind=air,
         )
+
+
+def refly(
+    aircraft: Aircraft, events: Sequence[Event], last_step: int, **options: Any
+) -> Iterator[Snapshot]:
+    """Fly a flight again from the events of the first one.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    events : sequence of Event
+        In the order in which they acted; the first is the start.
+    last_step : int
+        Where to end.
+    **options :
+        Those of `Simulation` but for the wind.
+
+    Yields
+    ------
+    Snapshot
+        At the start, after every tick and after every reset.
+
+    Raises
+    ------
+    SimulationError
+        The events do not begin with a start, or the flight cannot go on and no reset follows.
+    """
+    if not events or events[0].kind != "start":
+        raise SimulationError("events: the first must be the start of the flight")
+    start, waiting = events[0], collections.deque(events[1:])
+    simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **options)
+    yield simulation.snapshot()
+    fault: SimulationError | None = None
+    while simulation.step < last_step or (waiting and waiting[0].step <= simulation.step):
+        while waiting and waiting[0].step <= simulation.step:
+            event = waiting.popleft()
+            simulation.act(event)
+            if event.kind == "reset":
+                fault = None
+                yield simulation.snapshot()
+        if fault is not None:
+            raise fault
+        if simulation.step >= last_step:
+            return
+        try:
+            simulation.advance()
+        except SimulationError as error:
+            fault = error
+        yield simulation.snapshot()
 
 
 def plausible_bounds(aircraft: Aircraft) -> Array:

@@ -312,9 +312,7 @@ class Simulation:
         )
 
 
-def refly(
-    aircraft: Aircraft, events: Sequence[Event], last_step: int, **options: Any
-) -> Iterator[Snapshot]:
+def refly(aircraft: Aircraft, events: Sequence[Event], last_step: int, **options: Any) -> Iterator[Snapshot]:
     """Fly a flight again from the events of the first one.
 
     Parameters

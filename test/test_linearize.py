@@ -174,7 +174,7 @@ def test_the_papers_construction_for_four_blades_in_a_turn():
 def test_blocks_make_up_the_matrix(sbs, cruise):
     paper = linearize(sbs, point=cruise.trim, method="paper")
     parts = paper.blocks
-    order = [name for name in paper.state_names]
+    order = list(paper.state_names)
     body, inflow = range(8), [i for i, name in enumerate(order) if name.startswith("lambda")]
     rotor = [i for i in range(len(order)) if i not in body and i not in inflow]
     assert (len(body), len(rotor), len(inflow)) == (8, 24, 6)
@@ -287,7 +287,11 @@ def test_states_that_the_fidelity_leaves_out_are_not_there(sbs):
 
 @pytest.mark.parametrize("blades", [[3, 4], [5, 5]])
 def test_size_is_eight_and_the_sum_over_the_rotors(blades):
-    rotors = [{"blades": n, "blade_mass": 0.1613 * 3 / n, "chord": {"root": 0.153 / n, "tip": 0.153 / n}} for n in blades]
+    chords = [0.153 / n for n in blades]
+    rotors = [
+        {"blades": n, "blade_mass": 0.1613 * 3 / n, "chord": {"root": chord, "tip": chord}}
+        for n, chord in zip(blades, chords, strict=True)
+    ]
     model = linearize(build(rotors=rotors))
     assert len(model.state_names) == 8 + sum(4 * n + 3 for n in blades)
     assert model.mode("heave subsidence").pole.real == pytest.approx(-0.51, abs=0.05)

@@ -60,7 +60,7 @@ def test_units_of_the_states_do_not_matter(models, name):
 
 
 def test_participation_is_the_sensitivity_of_the_pole(models):
-    """d lambda / d a_kk is V_ki W_ik: taken here from poles of changed matrices."""
+    """V_ki W_ik is d lambda / d a_kk: taken here from poles of changed matrices."""
     model = models["10 m/s"]
     mode = model.mode("Dutch roll")
     sensitivity = []
@@ -164,7 +164,7 @@ def test_short_period_of_forward_flight_is_a_pair():
 
 
 def test_rotor_modes_have_the_frequencies_of_their_names(sbs, models):
-    """nu - 1, nu, nu + 1 per revolution: flap 1.237, lag 0.490 (MODEL.md section 3), and damping by the air."""
+    """At nu - 1, nu, nu + 1 per revolution: flap 1.237, lag 0.490 (MODEL.md section 3), and damping by the air."""
     omega = sbs.rotors[0].speed
     model = models["hover"]
     for kind in ("symmetric", "antisymmetric"):

@@ -105,7 +105,10 @@ def test_no_event_is_lost_with_dropped_reports(sbs, hover):
     assert_flown_again(sbs, reader)
 
 
-@pytest.mark.parametrize("options", [{"azimuth_step": math.radians(2.0)}, {"method": "partitioned"}, {"lead_lag": False}])
+OPTIONS = [{"azimuth_step": math.radians(2.0)}, {"method": "partitioned"}, {"lead_lag": False}]
+
+
+@pytest.mark.parametrize("options", OPTIONS)
 def test_options_decide_the_result(sbs, hover, options):
     with flying(simulation(sbs, hover, **options), real_time_factor=AS_FAST_AS_READ) as (loop, reader):
         for command in commands(hover, 5, 4):

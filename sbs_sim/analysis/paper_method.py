@@ -118,7 +118,7 @@ class _TaylorTerms:
         return result
 
     def expanded(self, inputs: Array) -> Array:
-        """F/m, I^-1 M, C0 xi0 + E of flap, C0 beta0 + E of lag, C^lambda lambda0 + E, in the places of the linear state."""
+        """F/m, I^-1 M, C0 xi0 + E of flap, C0 beta0 + E of lag, C^lambda lambda0 + E, in the linear state's places."""
         state, rates = inputs[: self.layout.linear_size], self._rates(inputs)
         result = np.zeros(self.layout.linear_size)
         self._expand_body(state, rates, result)

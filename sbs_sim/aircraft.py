@@ -5,16 +5,18 @@ concerns several values at once is checked here.
 """
 
 import hashlib
+import itertools
 import json
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.aircraft_values import places, replaced, separate
 from sbs_sim.errors import AircraftError, AirfoilError
 from sbs_sim.model import params as P
 from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells, read_table
@@ -168,6 +170,10 @@ class Aircraft:
         Range of each pilot control [rad].
     rotors : tuple of Rotor
     airfoils : dict of str to AirfoilTable
+    data : dict
+        The mapping that this is made of, with the keys of the file; not to be changed.
+    folder : Path
+        Where relative paths of airfoils start.
     """
 
     name: str
@@ -178,6 +184,8 @@ class Aircraft:
     control_ranges: dict[str, Range]
     rotors: tuple[Rotor, ...]
     airfoils: dict[str, AirfoilTable] = field(repr=False)
+    data: dict[str, Any] = field(repr=False, compare=False)
+    folder: Path = field(repr=False, compare=False)
 
     @classmethod
     def load(cls, path_or_name: str | Path) -> "Aircraft":
@@ -215,7 +223,13 @@ class Aircraft:
         AircraftError
             See `load`.
         """
+        return cls._made_of(data, folder or Path.cwd())
+
+    @classmethod
+    def _made_of(cls, data: Any, folder: Path, similar: "Aircraft | None" = None) -> "Aircraft":
+        """Checked aircraft of a mapping, with the airfoil tables of a similar one where they are the same."""
         _check_schema(data)
+        data = separate(data)
         rotors = tuple(_rotor(entry) for entry in data["rotors"])
         body = data["body"]
         aircraft = cls(
@@ -226,12 +240,42 @@ class Aircraft:
             options=Options(**{**data["options"], "elements": int(data["options"]["elements"])}),
             control_ranges={name: _radians(data["controls"][name]["range_deg"]) for name in CONTROL_NAMES},
             rotors=rotors,
-            airfoils=_load_airfoils(rotors, folder or Path.cwd()),
+            airfoils=_load_airfoils(rotors, folder, similar),
+            data=data,
+            folder=folder.absolute(),
         )
         problems = _physical_problems(aircraft)
         if problems:
             raise AircraftError("; ".join(problems))
         return aircraft
+
+    def with_value(self, path: str, value: Any) -> "Aircraft":
+        """Aircraft with one value of its file changed.
+
+        Parameters
+        ----------
+        path : str
+            Keys of the file with dots between them, indices of lists in brackets: "body.mass", "body.inertia[0][0]".
+            "rotors.blade_mass" is that of every rotor, "rotors[0].blade_mass" or "rotors.MR1.blade_mass" that of one.
+        value : number, str or list
+            What the file would hold there, in its units.
+
+        Raises
+        ------
+        AircraftError
+            A path that does not exist, or a value with which the aircraft is not possible: one line that names path,
+            value and what is allowed.
+        """
+        if isinstance(value, (np.generic, np.ndarray)):
+            value = value.tolist()
+        data = self.data
+        for place in places(data, _schema(), path):
+            data = replaced(data, place, value)
+        try:
+            return self._made_of(data, self.folder, self)
+        except AircraftError as error:
+            named = str(error).startswith(f"{path} = ")
+            raise AircraftError(f"{error}" if named else f"{path} = {_short(value)}: {error}") from None
 
     @property
     def layout(self) -> StateLayout:
@@ -276,7 +320,18 @@ class Aircraft:
             False holds the blades at zero lag.
         cyclic_inflow : bool
             False holds lambdas and lambdac at zero.
+
+        Returns
+        -------
+        Params
+            Shared with other callers: read only.
         """
+        choices = [lead_lag, cyclic_inflow, self.options.coupling == "complete", self.options.hub_moment == "complete"]
+        return self._params._replace(switches=np.array(choices, dtype=np.int64))
+
+    @cached_property
+    def _params(self) -> P.Params:
+        """Arrays but for the switches; nobody writes to them."""
         complete = self.options.coupling == "complete"
         mass, first, inertia = self.fuselage() if complete else (self.body.mass, np.zeros(3), self.body.inertia)
         names = sorted(self.airfoils)
@@ -287,9 +342,7 @@ class Aircraft:
         return P.Params(
             air=np.array([air.air_density, 1 / air.kinematic_viscosity, air.gravity, *self.body.flat_plate_areas]),
             body=np.array([mass, *first, *inertia.ravel()]),
-            switches=np.array(
-                [lead_lag, cyclic_inflow, complete, self.options.hub_moment == "complete"], dtype=np.int64
-            ),
+            switches=np.zeros(P.SWITCH_COUNT, dtype=np.int64),
             first_blade=np.cumsum([0, *(rotor.blades for rotor in self.rotors)]).astype(np.int64),
             rotor=np.stack([self._rotor_row(rotor) for rotor in self.rotors]),
             axes=np.stack([hub_axes(rotor.shaft_direction) for rotor in self.rotors]),
@@ -320,6 +373,8 @@ class Aircraft:
         )
         row[P.DUCT] = rotor.duct_expansion
         row[P.HUB_X : P.HUB_Z + 1] = rotor.hub
+        spacing = 2 * math.pi / rotor.blades
+        row[P.COS_SPACING], row[P.SIN_SPACING] = math.cos(spacing), math.sin(spacing)
         return row
 
 
@@ -366,12 +421,21 @@ def _read_yaml(path: Path) -> Any:
         raise AircraftError("not readable as YAML: " + " ".join(str(error).split())) from None
 
 
-def _check_schema(data: Any) -> None:
-    """Raise AircraftError with all that is wrong with keys, types and plain ranges."""
+@cache
+def _schema() -> dict[str, Any]:
+    return dict(json.loads((config_folder() / "aircraft.schema.json").read_text(encoding="utf-8")))
+
+
+@cache
+def _validator() -> Any:
     from jsonschema import Draft202012Validator  # here, because it is slow to import and needed once
 
-    schema = json.loads((config_folder() / "aircraft.schema.json").read_text(encoding="utf-8"))
-    errors = sorted(Draft202012Validator(schema).iter_errors(data), key=lambda error: list(map(str, error.path)))
+    return Draft202012Validator(_schema())
+
+
+def _check_schema(data: Any) -> None:
+    """Raise AircraftError with all that is wrong with keys, types and plain ranges."""
+    errors = sorted(_validator().iter_errors(data), key=lambda error: list(map(str, error.path)))
     # only data that the schema accepts have a structure that is known, in which the search comes to an end
     problems = [_explain(error) for error in errors] or [
         f"{path} = {value}: allowed is a finite number" for path, value in _not_finite(data, "")
@@ -462,21 +526,48 @@ def _radians(degrees: list[float]) -> Range:
     return math.radians(degrees[0]), math.radians(degrees[1])
 
 
-def _load_airfoils(rotors: tuple[Rotor, ...], folder: Path) -> dict[str, AirfoilTable]:
-    """Airfoil table of every name that a rotor uses; a partial table is extended for its blade's aspect ratio."""
+def _load_airfoils(rotors: tuple[Rotor, ...], folder: Path, similar: Aircraft | None) -> dict[str, AirfoilTable]:
+    """Airfoil table of every name that a rotor uses; a partial table is extended for its blade's aspect ratio.
+
+    What a similar aircraft from the same folder has read already is not read again.
+    """
+    read = _aspect_ratios(similar.rotors) if similar else {}
     tables: dict[str, AirfoilTable] = {}
-    for i, rotor in enumerate(rotors):
-        if rotor.airfoil not in tables:
-            try:
-                path = _find(rotor.airfoil, "airfoils", ".csv", folder)
-            except AircraftError as error:
-                raise AircraftError(f"rotors[{i}].{error}") from None
-            aspect_ratio = 2 * rotor.radius / (rotor.chord_root + rotor.chord_tip)
-            try:
-                tables[rotor.airfoil] = read_table(path, aspect_ratio)
-            except AirfoilError as error:
-                raise AirfoilError(f"rotors[{i}].airfoil = {rotor.airfoil!r}: {error}") from None
+    for name, aspect_ratio in _aspect_ratios(rotors).items():
+        i = [rotor.airfoil for rotor in rotors].index(name)
+        if similar and read.get(name) == aspect_ratio:
+            tables[name] = similar.airfoils[name]
+            continue
+        try:
+            path = _find(name, "airfoils", ".csv", folder)
+        except AircraftError as error:
+            raise AircraftError(f"rotors[{i}].{error}") from None
+        if similar and name in read and _covers_circle(path):
+            tables[name] = similar.airfoils[name]
+            continue
+        try:
+            tables[name] = read_table(path, aspect_ratio)
+        except AirfoilError as error:
+            raise AirfoilError(f"rotors[{i}].airfoil = {name!r}: {error}") from None
     return tables
+
+
+def _aspect_ratios(rotors: tuple[Rotor, ...]) -> dict[str, float]:
+    """Aspect ratio of the first blade that has each airfoil."""
+    ratios: dict[str, float] = {}
+    for rotor in rotors:
+        ratios.setdefault(rotor.airfoil, 2 * rotor.radius / (rotor.chord_root + rotor.chord_tip))
+    return ratios
+
+
+def _covers_circle(path: Path) -> bool:
+    """True for a table that begins at -180 deg: it is not extended, and so the aspect ratio does not matter."""
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            rows = [line for line in itertools.islice(file, 1000) if line.strip() and not line.lstrip().startswith("#")]
+        return float(rows[1].split(",")[1]) == -180.0  # the first row is the header
+    except (OSError, ValueError, IndexError):  # what is wrong is told where the table is read
+        return False
 
 
 def _airfoil_grids(aircraft: Aircraft, first_rows: dict[str, int]) -> tuple[P.IntArray, Array]:

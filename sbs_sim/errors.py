@@ -14,7 +14,19 @@ class AirfoilError(AircraftError):
 
 
 class TrimError(SbsError):
-    """No equilibrium was found for a flight condition."""
+    """No equilibrium was found for a flight condition.
+
+    Attributes
+    ----------
+    residual : float or None
+        Largest scaled residual where the search ended; None if there was no search.
+    worst_equation : str or None
+        The equation that it is in, as "d(state)/dt".
+    """
+
+    def __init__(self, message: str, *, residual: float | None = None, worst_equation: str | None = None) -> None:
+        super().__init__(message)
+        self.residual, self.worst_equation = residual, worst_equation
 
 
 class LinearizationError(SbsError):

@@ -185,14 +185,14 @@ class Simulation:
         return Event(self.step, "start", self.swashplate.copy(), self.state.copy(), self.wind)
 
     def act(self, event: Event) -> None:
-        """Let an event act; a start acts as a reset with its wind.
+        """Let an event act; one with a state resets.
 
         Raises
         ------
         SimulationError
             See `reset`, `set_swashplate`.
         """
-        if event.kind in ("start", "reset"):
+        if event.state is not None and event.swashplate is not None:
             self.reset(event.state, event.swashplate)
         elif event.swashplate is not None:
             self.set_swashplate(event.swashplate)
@@ -335,9 +335,9 @@ def refly(aircraft: Aircraft, events: Sequence[Event], last_step: int, **options
     SimulationError
         The events do not begin with a start, or the flight cannot go on and no reset follows.
     """
-    if not events or events[0].kind != "start":
+    start, waiting = events[0] if events else None, collections.deque(events[1:])
+    if start is None or start.kind != "start" or start.state is None or start.swashplate is None:
         raise SimulationError("events: the first must be the start of the flight")
-    start, waiting = events[0], collections.deque(events[1:])
     simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **options)
     yield simulation.snapshot()
     fault: SimulationError | None = None

@@ -3,6 +3,7 @@
 import shutil
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.trim import trim
 from sbs_sim.model.kernel import cache_folder
 from sbs_sim.simulation import simulate
@@ -13,6 +14,8 @@ def main() -> None:
     aircraft = Aircraft.load("sbs")
     hover = trim(aircraft)
     simulate(aircraft, hover, hover.controls, duration=0.01)
+    linearize(aircraft, point=hover, method="paper")
+    trim(aircraft, method="two_loop")
     folder = cache_folder()
     for other in folder.parent.glob("kernels-*"):
         if other != folder:

@@ -226,8 +226,16 @@ def linearize(
     if not STEP_SCALES[0] <= step_scale <= STEP_SCALES[1]:
         raise LinearizationError(f"step_scale = {step_scale}: allowed are {STEP_SCALES[0]:g} to {STEP_SCALES[1]:g}")
     if point is None:
-        fidelity = {"lead_lag": lead_lag, "cyclic_inflow": cyclic_inflow}
-        point = trim(aircraft, airspeed, climb_rate, sideslip, turn_rate, azimuth_count=azimuth_count, **fidelity)
+        point = trim(
+            aircraft,
+            airspeed,
+            climb_rate,
+            sideslip,
+            turn_rate,
+            lead_lag=lead_lag,
+            cyclic_inflow=cyclic_inflow,
+            azimuth_count=azimuth_count,
+        )
     model = _averaged(aircraft, point, step_scale)
     if method == "averaged":
         return model

@@ -268,9 +268,7 @@ def _name_lateral(inside: list[Mode], state_names: Sequence[str]) -> list[Mode]:
 # --- names of the rotors' modes ---------------------------------------------------------------------------------
 
 
-def _name_rotor(
-    inside: list[Mode], parts: Sequence[Part], state_names: Sequence[str], states: list[int]
-) -> list[Mode]:
+def _name_rotor(inside: list[Mode], parts: Sequence[Part], state_names: Sequence[str], states: list[int]) -> list[Mode]:
     """Names of the modes of one family and harmonic, with what several rotors do together."""
     family, harmonic = parts[states[0]].family, parts[states[0]].harmonic
     rotors = sorted({parts[i].rotor for i in states})

@@ -97,6 +97,8 @@ class _TaylorTerms:
         self._psi = azimuths(aircraft, point.azimuth_count)
         self._dx = np.zeros(self.layout.size)
         self._loads = np.zeros((len(aircraft.rotors), P.LOAD_SIZE))
+        self._constant = [self._turning(rotor) for rotor in aircraft.rotors]
+        self._at_trim = [self._coupling(j, point.state[self._places(j)[0]]) for j in range(len(aircraft.rotors))]
 
     def _places(self, rotor: int) -> list[slice]:
         """Places of one rotor's flap, flap rates, lag, lag rates in the linear state."""
@@ -122,10 +124,10 @@ class _TaylorTerms:
         state, rates = inputs[: self.layout.linear_size], self._rates(inputs)
         result = np.zeros(self.layout.linear_size)
         self._expand_body(state, rates, result)
-        for j, rotor in enumerate(self.aircraft.rotors):
+        for j, (k0, k1) in enumerate(self._constant):
             flap, flap_rate, lag, lag_rate = self._places(j)
-            k0, k1 = self._turning(rotor)
-            c0b, c1b, c0x, c1x = self._coupling(j, state[flap])
+            flapped = not np.array_equal(state[flap], self.trim[flap])
+            c0b, c1b, c0x, c1x = self._coupling(j, state[flap]) if flapped else self._at_trim[j]
             beta, dbeta, xi, dxi = state[flap], state[flap_rate], state[lag], state[lag_rate]
             forcing = rates[flap_rate] + k1 @ dbeta + k0 @ beta - c1b @ dxi - c0b @ xi
             result[flap_rate] = c0b @ self.trim[lag] + forcing
@@ -159,9 +161,9 @@ class _TaylorTerms:
     def _turning(self, rotor: Rotor) -> tuple[Array, Array]:
         """K0 and K1 of one rotor, eqs. [26] and [27]; they do not depend on the azimuth."""
         to_blades = blade_matrix(rotor.blades, 0.0)
-        k0 = rotor.speed**2 * np.linalg.solve(to_blades, blade_matrix(rotor.blades, 0.0, 2))
-        k1 = 2 * rotor.speed * np.linalg.solve(to_blades, blade_matrix(rotor.blades, 0.0, 1))
-        return k0, k1
+        back = np.asarray(np.linalg.inv(to_blades), dtype=np.float64)
+        first, second = (back @ blade_matrix(rotor.blades, 0.0, order) for order in (1, 2))
+        return rotor.speed**2 * second, 2 * rotor.speed * first
 
     def _coupling(self, j: int, flap: Array) -> tuple[Array, Array, Array, Array]:
         """C0, C1 of flap and C0, C1 of lag of one rotor, eqs. [28] to [31], averaged over the azimuth.
@@ -195,10 +197,9 @@ class _TaylorTerms:
             names += ["C0_beta", "C1_beta", "K0_xi", "K1_xi", "C0_xi", "C1_xi"]
         for name in names:
             found[name] = np.zeros((n, n))
-        for j, rotor in enumerate(self.aircraft.rotors):
+        for j, (k0, k1) in enumerate(self._constant):
             flap = self._places(j)[0]
-            k0, k1 = self._turning(rotor)
-            c0b, c1b, c0x, c1x = self._coupling(j, self.trim[flap])
+            c0b, c1b, c0x, c1x = self._at_trim[j]
             place = slice(flap.start - S.LINEAR_BODY_SIZE, flap.stop - S.LINEAR_BODY_SIZE)
             values = {"K0_beta": k0, "K1_beta": k1, "K0_xi": k0, "K1_xi": k1}
             values |= {"C0_beta": c0b, "C1_beta": c1b, "C0_xi": c0x, "C1_xi": c1x}

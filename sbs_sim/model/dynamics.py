@@ -42,6 +42,61 @@ def derivative(p, x, swash, psi, wind, work, dx):
     dx : ndarray, shape (size,)
         Output.
     """
+    rot, om, g = _known_terms(p, x, swash, psi, wind, work)
+    if p.switches[P.COMPLETE_COUPLING] == 1:
+        _solve_with_blades(p, work)
+        _solve_blades(p, work)
+        _hub_loads(p, work)
+    else:
+        _solve_blades_alone(p, work)
+        _hub_loads(p, work)
+        _solve_body_alone(p, work)
+    _body_rates(x, rot, om, g, work.vector, dx)
+    _rotor_rates(p, x, work, dx)
+
+
+@entry
+def steady_balance(p, x, swash, psi, wind, work, dx, imbalance):
+    """What the model gives while the body does not accelerate: for the two loops of trim (MODEL.md section 8).
+
+    The blades are taken twice. As they move on a hub in steady motion (U' = om' = 0), they give the rates of the
+    rotors. Held on constant multiblade coordinates, with the steady accelerations
+    beta'' = Omega^2 (a1 cos psi + b1 sin psi), they give the loads on the body. Both averages over the azimuth vanish
+    at a trim, but for products of the vibrations of body and blades.
+
+    Parameters
+    ----------
+    p, x, swash, psi, wind : see `derivative`
+    work : Work
+        `work.loads` holds the loads of the blades on constant coordinates afterwards, `work.vector` the specific
+        force of the c.g. in steady motion, om x U - g [m/s^2], and three zeros.
+    dx : ndarray, shape (size,)
+        Output: rates of the rotor states, and of position and attitude; U' and om' are zero.
+    imbalance : ndarray, shape (6,)
+        Output: force [N] and moment about the c.g. [N m], body axes, that are left to accelerate the aircraft.
+    """
+    rot, om, g = _known_terms(p, x, swash, psi, wind, work)
+    body = work.vector
+    for m in range(6):
+        imbalance[m] = body[m]
+    turn = cross(om[0], om[1], om[2], x[7], x[8], x[9])
+    body[0], body[1], body[2] = turn[0] - g[0], turn[1] - g[1], turn[2] - g[2]
+    body[3] = body[4] = body[5] = 0.0
+    if p.switches[P.COMPLETE_COUPLING] == 1:
+        _solve_blades(p, work)
+    else:
+        _solve_blades_alone(p, work)
+    _body_rates(x, rot, om, g, body, dx)
+    _rotor_rates(p, x, work, dx)
+    _hold_coordinates(p, x, work)
+    _hub_loads(p, work)
+    _add_hub_loads(p, work, imbalance)
+    _subtract_carried_body(p.body, body, imbalance)
+
+
+@kernel
+def _known_terms(p, x, swash, psi, wind, work):
+    """Work rows of all blades and the known part of the body's system; rotation, body rates and gravity."""
     rot = rotation_rows(x[3], x[4], x[5], x[6])
     om = (x[10], x[11], x[12])
     gravity = p.air[P.GRAVITY]
@@ -54,16 +109,7 @@ def derivative(p, x, swash, psi, wind, work, dx):
     for j in range(p.rotor.shape[0]):
         _rotor_terms(p, j, x, swash, psi[j], air, om, g, work)
     _start_body_system(p, air, om, work)
-    if p.switches[P.COMPLETE_COUPLING] == 1:
-        _solve_with_blades(p, work)
-        _solve_blades(p, work)
-        _hub_loads(p, om, work)
-    else:
-        _solve_blades_alone(p, work)
-        _hub_loads(p, om, work)
-        _solve_body_alone(p, work)
-    _body_rates(x, rot, om, g, work.vector, dx)
-    _rotor_rates(p, x, work, dx)
+    return rot, om, g
 
 
 @kernel
@@ -96,7 +142,7 @@ def _rotor_terms(p, j, x, swash, psi, air, om, g, work):
     work.rotor_inertia[j, :] = 0.0
     thrust = sine_moment = cosine_moment = 0.0
     cosine, sine = math.cos(psi), math.sin(psi)
-    step_c, step_s = math.cos(2.0 * math.pi / n_blades), math.sin(2.0 * math.pi / n_blades)
+    step_c, step_s = rotor[P.COS_SPACING], rotor[P.SIN_SPACING]
     for k in range(n_blades):
         row = work.blade[first + k]
         beta, beta_rate = blade_angle(x, flap, flap_rate, n_blades, k, cosine, sine, omega)
@@ -295,7 +341,35 @@ def _solve_blades_alone(p, work):
 
 
 @kernel
-def _hub_loads(p, om, work):
+def _hold_coordinates(p, x, work):
+    """Accelerations of the blades in the rotating frame on multiblade coordinates that do not change."""
+    all_blades = p.first_blade[-1]
+    for j in range(p.rotor.shape[0]):
+        first = p.first_blade[j]
+        n_blades = p.first_blade[j + 1] - first
+        flap, lag, omega = S.BODY_SIZE + first, S.BODY_SIZE + 2 * all_blades + first, p.rotor[j, P.SPEED]
+        for i in range(first, first + n_blades):
+            row = work.blade[i]
+            c, s = row[P.COSINE], row[P.SINE]
+            row[P.FLAP_ACCELERATION] = _steady_acceleration(x, flap, n_blades, c, s, omega)
+            row[P.LAG_ACCELERATION] = _steady_acceleration(x, lag, n_blades, c, s, omega) * p.switches[P.LEAD_LAG]
+
+
+@kernel
+def _steady_acceleration(x, angles, n_blades, cosine, sine, speed):
+    """Acceleration of a blade on constant coordinates: sum of (n Omega)^2 (a_n cos n psi + b_n sin n psi)."""
+    acceleration = 0.0
+    cn, sn = cosine, sine
+    for n in range(1, (n_blades - 1) // 2 + 1):
+        i = angles + 2 * n - 1
+        harmonic = n * speed
+        acceleration += harmonic * harmonic * (x[i] * cn + x[i + 1] * sn)
+        cn, sn = cn * cosine - sn * sine, sn * cosine + cn * sine
+    return acceleration
+
+
+@kernel
+def _hub_loads(p, work):
     """Force and moment of each rotor on its hub, thrust and shaft torque, into `work.loads`."""
     complete = p.switches[P.COMPLETE_COUPLING] == 1
     b = work.vector
@@ -353,9 +427,8 @@ def _paper_hub_moment(p, j, work):
 
 
 @kernel
-def _solve_body_alone(p, work):
-    """Specific force and angular acceleration of the rigid aircraft under the hub loads (`paper`)."""
-    k, b = work.matrix, work.vector
+def _add_hub_loads(p, work, b):
+    """Add the loads of all rotors on their hubs, about the c.g., to a six-vector."""
     for j in range(p.rotor.shape[0]):
         out = work.loads[j]
         hx, hy, hz = p.rotor[j, P.HUB_X], p.rotor[j, P.HUB_Y], p.rotor[j, P.HUB_Z]
@@ -363,6 +436,23 @@ def _solve_body_alone(p, work):
         for m in range(3):
             b[m] += out[P.FORCE + m]
             b[3 + m] += out[P.MOMENT + m] + arm[m]
+
+
+@kernel
+def _subtract_carried_body(body, acceleration, b):
+    """Take from a six-vector what gives the rigid part a specific force without angular acceleration."""
+    ax, ay, az = acceleration[0], acceleration[1], acceleration[2]
+    m = cross(body[P.FIRST_MOMENT], body[P.FIRST_MOMENT + 1], body[P.FIRST_MOMENT + 2], ax, ay, az)
+    for i in range(3):
+        b[i] -= body[P.MASS] * acceleration[i]
+        b[3 + i] -= m[i]
+
+
+@kernel
+def _solve_body_alone(p, work):
+    """Specific force and angular acceleration of the rigid aircraft under the hub loads (`paper`)."""
+    k, b = work.matrix, work.vector
+    _add_hub_loads(p, work, b)
     k[:, :] = 0.0
     i = P.INERTIA
     k[0, 0] = k[1, 1] = k[2, 2] = p.body[P.MASS]

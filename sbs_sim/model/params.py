@@ -47,8 +47,10 @@ BODY_SIZE = 13
     HUB_X,
     HUB_Y,
     HUB_Z,
-) = range(21)
-ROTOR_SIZE = 21
+    COS_SPACING,  # angle between neighbouring blades, 2 pi / N_b
+    SIN_SPACING,
+) = range(23)
+ROTOR_SIZE = 23
 
 # element: rows per rotor; the last axis runs along the blade
 SPAN, CHORD, HALF_AREA, LIFT_FRACTION, TWIST = range(5)

@@ -1,0 +1,84 @@
+"""Newton's method with central differences and halved steps, for a few dozen unknowns of order one or less."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Equations = Callable[[Array], Array]
+
+TOLERANCE = 1e-11  # of the largest residual, which is to be scaled to the order of one
+MOST_ITERATIONS = 30
+DIFFERENCE_STEP = 1e-6
+LARGEST_UNKNOWN = math.pi / 2  # angles and inflow ratios beyond it make no sense
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where Newton's method has ended.
+
+    Attributes
+    ----------
+    values, residual : ndarray, shape (n,)
+        Unknowns and what is left of the equations there.
+    iterations : int
+    converged : bool
+    """
+
+    values: Array
+    residual: Array
+    iterations: int
+    converged: bool
+
+
+def newton(equations: Equations, start: Array) -> Solution:
+    """Solve equations(values) = 0 with halved steps where a full one does not lessen the residual.
+
+    Parameters
+    ----------
+    equations : callable
+        Residuals, shape (n,), of the unknowns, shape (n,).
+    start : ndarray, shape (n,)
+    """
+    values, residual = start, equations(start)
+    for iteration in range(MOST_ITERATIONS):
+        size = float(np.abs(residual).max())
+        if size < TOLERANCE:
+            return Solution(values, residual, iteration, True)
+        try:
+            step = np.asarray(np.linalg.solve(_jacobian(equations, values), residual), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            break
+        better = _descend(equations, values, step, residual)
+        if better is None:
+            if size < 100 * TOLERANCE:  # rounding has stopped it, not the equations
+                return Solution(values, residual, iteration, True)
+            break
+        values, residual = better
+    return Solution(values, residual, iteration + 1, False)
+
+
+def _jacobian(equations: Equations, values: Array) -> Array:
+    """Derivative of the residuals by central differences."""
+    columns = []
+    for i in range(len(values)):
+        forward, backward = values.copy(), values.copy()
+        forward[i] += DIFFERENCE_STEP
+        backward[i] -= DIFFERENCE_STEP
+        columns.append((equations(forward) - equations(backward)) / (2 * DIFFERENCE_STEP))
+    return np.stack(columns, axis=1)
+
+
+def _descend(equations: Equations, values: Array, step: Array, residual: Array) -> tuple[Array, Array] | None:
+    """Unknowns and residual after the longest of the steps 1, 1/2, 1/4 ... that lessens it; None if none does."""
+    size = np.linalg.norm(residual)
+    for halvings in range(8):
+        candidate = values - step / 2**halvings
+        if np.abs(candidate).max() < LARGEST_UNKNOWN:
+            new = equations(candidate)
+            if np.linalg.norm(new) < size:  # false for a NaN as well
+                return candidate, new
+    return None

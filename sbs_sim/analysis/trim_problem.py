@@ -1,0 +1,279 @@
+"""The equations of trim, and what a trimmed flight is (MODEL.md section 8).
+
+Unknowns are pitch and roll, the four controls, and of every rotor flap, lag and inflow; equations are the averages of
+the six body accelerations, of the flap and lag accelerations and of the inflow rates.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.errors import TrimError
+from sbs_sim.model import params as P
+from sbs_sim.model import state as S
+from sbs_sim.model.average import averaged_derivative
+from sbs_sim.model.frames import euler_to_quaternion, hub_axes, rotation_matrix
+
+Array = NDArray[np.float64]
+
+ATTITUDE_UNKNOWNS, CONTROL_UNKNOWNS = 2, 4
+BODY_UNKNOWNS = ATTITUDE_UNKNOWNS + CONTROL_UNKNOWNS
+
+
+@dataclass(frozen=True)
+class TrimCondition:
+    """The flight to be trimmed, relative to the air.
+
+    Parameters
+    ----------
+    airspeed : float
+        Horizontal component of the velocity [m/s]; negative is backwards.
+    climb_rate : float
+        Vertical component, positive up [m/s].
+    sideslip : float
+        Angle from the heading to the horizontal track, positive to the right [rad]: pi/2 is sideways to the right.
+    turn_rate : float
+        Rate of the heading, positive to the right [rad/s].
+
+    Raises
+    ------
+    TrimError
+        For a value that is not finite or out of range.
+    """
+
+    airspeed: float = 0.0
+    climb_rate: float = 0.0
+    sideslip: float = 0.0
+    turn_rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        limits = {"airspeed": (100.0, "m/s"), "climb_rate": (50.0, "m/s")}
+        limits |= {"sideslip": (math.pi, "rad"), "turn_rate": (3.0, "rad/s")}
+        for name, (most, unit) in limits.items():
+            value = getattr(self, name)
+            if not abs(value) <= most:  # true for a NaN as well
+                raise TrimError(f"{name} = {value}: allowed are {-most:g} to {most:g} {unit}")
+
+    def scaled(self, share: float) -> "TrimCondition":
+        """Condition on the way from hover (0) to this one (1)."""
+        return TrimCondition(share * self.airspeed, share * self.climb_rate, self.sideslip, share * self.turn_rate)
+
+    def motion(self, pitch: float, roll: float) -> tuple[Array, Array]:
+        """Velocity [m/s] and angular velocity [rad/s] in body axes at an attitude [rad], each shape (3,)."""
+        along, across = math.cos(self.sideslip), math.sin(self.sideslip)
+        heading_axes = np.array([self.airspeed * along, self.airspeed * across, -self.climb_rate])
+        to_body = rotation_matrix(euler_to_quaternion(0.0, pitch, roll)).T
+        return to_body @ heading_axes, to_body @ np.array([0.0, 0.0, self.turn_rate])
+
+
+@dataclass(frozen=True)
+class TrimPoint:
+    """A trimmed flight.
+
+    Attributes
+    ----------
+    condition : TrimCondition
+    lead_lag, cyclic_inflow : bool
+        Fidelity.
+    azimuth_count : int
+        N_c of the averages.
+    controls : ndarray, shape (4,)
+        Collective, lateral, longitudinal, differential longitudinal cyclic [rad].
+    swashplate : ndarray, shape (n_rotors, 3)
+        Angles of each rotor [rad].
+    pitch, roll : float
+        [rad]
+    state : ndarray, shape (n,)
+        Linear state, 38 for two three-bladed rotors; names in `state_names`.
+    state_names : tuple of str
+    thrust, torque, power : ndarray, shape (n_rotors,)
+        Mean aerodynamic thrust along the shaft [N], shaft torque [N m], shaft power [W].
+    residual : float
+        Largest scaled residual of the complete equations, whatever the method: accelerations over gravity, rotor and
+        inflow rates over those of one revolution.
+    method : str
+        "newton" or "two_loop".
+    iterations : int
+        Newton iterations in all, or iterations of the outer loop.
+    inner_iterations : int
+        Iterations of the inner loop in all; 0 with Newton's method.
+    beyond_limits : tuple of str
+        Controls and swashplate angles that the trim needs beyond their range; empty if it can be flown.
+    """
+
+    condition: TrimCondition
+    lead_lag: bool
+    cyclic_inflow: bool
+    azimuth_count: int
+    controls: Array
+    swashplate: Array
+    pitch: float
+    roll: float
+    state: Array
+    state_names: tuple[str, ...]
+    thrust: Array
+    torque: Array
+    power: Array
+    residual: float
+    method: str
+    iterations: int
+    inner_iterations: int
+    beyond_limits: tuple[str, ...]
+
+
+class TrimProblem:
+    """The equations of trim for one aircraft and fidelity.
+
+    Unknowns, shape (n,): pitch, roll, the four controls [rad]; then rotor by rotor flap, lag [rad] and inflow.
+    Equations, shape (n,): the rates of u, v, w, p, q, r; then those of the rotor states in the unknowns' order, flap
+    and lag by their accelerations.
+
+    Attributes
+    ----------
+    equations : ndarray of int64, shape (n,)
+        Places of the equations in the rate of the simulation state.
+    scales : ndarray, shape (n,)
+        What each is divided by: gravity [m/s^2], Omega^2 [1/s^2], Omega [1/s].
+    coordinates, inflow : ndarray of int64
+        Places of flap and lag, and of inflow, among the unknowns and among the equations.
+    loads : ndarray, shape (n_rotors, params.LOAD_SIZE)
+        Mean loads of the last residual.
+    """
+
+    def __init__(self, aircraft: Aircraft, lead_lag: bool, cyclic_inflow: bool, azimuth_count: int) -> None:
+        self.aircraft = aircraft
+        self.lead_lag, self.cyclic_inflow, self.azimuth_count = lead_lag, cyclic_inflow, azimuth_count
+        self.layout = aircraft.layout
+        self.params = aircraft.params(lead_lag, cyclic_inflow)
+        self.work = P.make_work(self.params)
+        self._mixing = np.stack([rotor.mixing for rotor in aircraft.rotors])
+        self._places, equations = self._rotor_unknowns()
+        self.equations = np.concatenate([np.arange(S.VELOCITY, S.BODY_SIZE), equations])
+        self.scales = self._equation_scales()
+        is_inflow = self._places >= self.layout.inflow(0).start
+        self.coordinates = BODY_UNKNOWNS + np.flatnonzero(~is_inflow)
+        self.inflow = BODY_UNKNOWNS + np.flatnonzero(is_inflow)
+        self._dx = np.zeros(self.layout.size)
+        self.loads = np.zeros((len(aircraft.rotors), P.LOAD_SIZE))
+
+    def _rotor_unknowns(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Places of the unknown rotor states in the simulation state, and of their equations in its rate."""
+        places: list[int] = []
+        equations: list[int] = []
+        index = np.arange(self.layout.size)
+        for j in range(len(self.aircraft.rotors)):
+            places += list(index[self.layout.flap(j)])
+            equations += list(index[self.layout.flap_rate(j)])
+            if self.lead_lag:
+                places += list(index[self.layout.lag(j)])
+                equations += list(index[self.layout.lag_rate(j)])
+            inflow = index[self.layout.inflow(j)][: 3 if self.cyclic_inflow else 1]
+            places += list(inflow)
+            equations += list(inflow)
+        return np.array(places), np.array(equations)
+
+    def _equation_scales(self) -> Array:
+        gravity = max(self.aircraft.environment.gravity, 1.0)
+        scales = np.full(self.layout.size, gravity)
+        for j, rotor in enumerate(self.aircraft.rotors):
+            scales[self.layout.flap_rate(j)] = scales[self.layout.lag_rate(j)] = rotor.speed**2
+            scales[self.layout.inflow(j)] = rotor.speed
+        return scales[self.equations]
+
+    def first_guess(self, idle: float) -> Array:
+        """Hover by momentum theory: the weight on the rotors that point up, a collective right to a few degrees.
+
+        A rotor that does not point up gets the inflow of a share `idle` of that disc loading: where it has none at
+        all, its flow through the disc vanishes and so does Newton's sense of direction.
+        """
+        aircraft, air = self.aircraft, self.aircraft.environment
+        x = np.zeros(self.layout.size)
+        upward = [max(0.0, hub_axes(rotor.shaft_direction)[2, 2]) for rotor in aircraft.rotors]
+        lifting = sum(math.pi * rotor.radius**2 * up for rotor, up in zip(aircraft.rotors, upward, strict=True))
+        loading = aircraft.body.mass * air.gravity / max(lifting, 1e-6)
+        for j, (rotor, up) in enumerate(zip(aircraft.rotors, upward, strict=True)):
+            induced = math.sqrt(max(up, idle) * loading / (2 * max(air.air_density, 1e-3)))
+            x[self.layout.inflow(j).start] = induced / (rotor.speed * rotor.radius)
+        return np.concatenate([[0.0, 0.0, math.radians(9.0), 0.0, 0.0, 0.0], x[self._places]])
+
+    def state(self, condition: TrimCondition, unknowns: Array) -> tuple[Array, Array]:
+        """Simulation state at the origin, heading north, and swashplate angles of a vector of unknowns."""
+        pitch, roll = unknowns[:ATTITUDE_UNKNOWNS]
+        x = np.zeros(self.layout.size)
+        x[S.ATTITUDE : S.ATTITUDE + 4] = euler_to_quaternion(0.0, pitch, roll)
+        x[S.VELOCITY : S.RATES], x[S.RATES : S.BODY_SIZE] = condition.motion(pitch, roll)
+        x[self._places] = unknowns[BODY_UNKNOWNS:]
+        return x, self._mixing @ unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS]
+
+    def residual(self, condition: TrimCondition, unknowns: Array) -> Array:
+        """Scaled residuals of the equations; the mean loads are left in `loads`."""
+        x, swash = self.state(condition, unknowns)
+        averaged_derivative(self.params, x, swash, self.azimuth_count, np.zeros(3), self.work, self._dx, self.loads)
+        return self._dx[self.equations] / self.scales
+
+    def worst_equation(self, residual: Array) -> str:
+        """Name of the equation with the largest residual, as "d(state)/dt"."""
+        worst = int(np.argmax(np.abs(residual)))
+        return f"d({self.layout.names[self.equations[worst]]})/dt"
+
+    def beyond_limits(self, unknowns: Array) -> tuple[str, ...]:
+        """What lies beyond its range, as "name = value deg: allowed are low to high deg"."""
+        controls = unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS]
+        return _beyond_limits(self.aircraft, controls, self._mixing @ controls)
+
+    def point(
+        self, condition: TrimCondition, unknowns: Array, method: str, iterations: int, inner_iterations: int = 0
+    ) -> TrimPoint:
+        """Result of a solution."""
+        residual = self.residual(condition, unknowns)
+        x, swash = self.state(condition, unknowns)
+        controls = unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS].copy()
+        speeds = np.array([rotor.speed for rotor in self.aircraft.rotors])
+        torque = self.loads[:, P.TORQUE].copy()
+        return TrimPoint(
+            condition=condition,
+            lead_lag=self.lead_lag,
+            cyclic_inflow=self.cyclic_inflow,
+            azimuth_count=self.azimuth_count,
+            controls=controls,
+            swashplate=swash,
+            pitch=float(unknowns[0]),
+            roll=float(unknowns[1]),
+            state=self.layout.to_linear(x),
+            state_names=self.layout.linear_names,
+            thrust=self.loads[:, P.THRUST].copy(),
+            torque=torque,
+            power=torque * speeds,
+            residual=float(np.abs(residual).max()),
+            method=method,
+            iterations=iterations,
+            inner_iterations=inner_iterations,
+            beyond_limits=self.beyond_limits(unknowns),
+        )
+
+
+def _beyond_limits(aircraft: Aircraft, controls: Array, swash: Array) -> tuple[str, ...]:
+    """What lies beyond its range, as "name = value deg: allowed are low to high deg"."""
+    found = [
+        _outside(name, value, aircraft.control_ranges[name])
+        for name, value in zip(S.CONTROL_NAMES, controls, strict=True)
+    ]
+    for rotor, angles in zip(aircraft.rotors, swash, strict=True):
+        ranges = (rotor.collective_range, rotor.cyclic_range, rotor.cyclic_range)
+        found += [
+            _outside(f"{rotor.name} {name}", value, limits)
+            for name, value, limits in zip(S.SWASHPLATE_NAMES, angles, ranges, strict=True)
+        ]
+    return tuple(text for text in found if text)
+
+
+def _outside(name: str, value: float, limits: tuple[float, float]) -> str:
+    low, high = limits
+    if low - 1e-12 <= value <= high + 1e-12:
+        return ""
+    low, high, value = (math.degrees(angle) for angle in (low, high, value))
+    return f"{name} = {value:.3f} deg: allowed are {low:g} to {high:g} deg"

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft_values import places, replaced, separate
+from sbs_sim.aircraft_values import places, replaced, separate, value_at
 from sbs_sim.errors import AircraftError, AirfoilError
 from sbs_sim.model import params as P
 from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells, read_table
@@ -248,6 +248,17 @@ class Aircraft:
         if problems:
             raise AircraftError("; ".join(problems))
         return aircraft
+
+    def value(self, path: str) -> Any:
+        """Value of the file at a path, see `with_value`; a list where the path means one of every rotor.
+
+        Raises
+        ------
+        AircraftError
+            A path that does not exist.
+        """
+        found = [value_at(self.data, place) for place in places(self.data, _schema(), path)]
+        return found[0] if len(found) == 1 else found
 
     def with_value(self, path: str, value: Any) -> "Aircraft":
         """Aircraft with one value of its file changed.

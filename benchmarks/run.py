@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import psutil
+from analysis_rows import analysis_rows
 
 from sbs_sim import Aircraft, simulate, trim
 from sbs_sim.model import params as P
@@ -45,7 +46,7 @@ def main() -> None:
         "--memory", type=float, default=0.0, help="minutes to watch the node's memory, 0 to leave it out"
     )
     arguments = parser.parse_args()
-    rows: list[Row] = [*kernel_rows(), *start_rows()]
+    rows: list[Row] = [*kernel_rows(), *analysis_rows(timed), *start_rows()]
     if arguments.node > 0:
         rows += node_rows(arguments.node, arguments.memory)
     print_table(rows)
@@ -87,7 +88,7 @@ def timed(work: Callable[[], Any], repeats: int) -> tuple[float, str]:
 
 
 def kernel_rows() -> list[Row]:
-    """Derivative, integration and trim, one thread."""
+    """Derivative and integration, one thread."""
     aircraft = Aircraft.load("sbs")
     forward = trim(aircraft, airspeed=10.0)
     hover = trim(aircraft)
@@ -96,9 +97,6 @@ def kernel_rows() -> list[Row]:
     rows += [integration_row(aircraft, forward, degrees) for degrees in (1.0, 2.5, 5.0, 10.0)]
     seconds, note = timed(lambda: simulate(aircraft, forward, forward.controls, 1.0), 11)
     rows.append(("simulate() at 5 deg, 100 Hz", 1.0 / seconds, "x real", note))
-    for name, speed in (("hover", 0.0), ("20 m/s", 20.0)):
-        seconds, note = timed(lambda speed=speed: trim(aircraft, airspeed=speed), 11)
-        rows.append((f"trim {name}", 1e3 * seconds, "ms", note))
     rows.insert(0, ("blade elements", elements, "", "with a look-up of cl and cd (Re, alpha) each"))
     return rows
 

@@ -1,6 +1,7 @@
 """Real processes and a real DDS participant for the tests of the nodes; everything stays on loopback."""
 
 import contextlib
+import itertools
 import os
 import signal
 import subprocess
@@ -11,15 +12,17 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
+from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
 
 EXECUTABLES = Path(__file__).resolve().parent.parent / "install" / "sbs_sim" / "lib" / "sbs_sim"
+DOMAINS = itertools.cycle(1 + (os.getpid() + i) % 100 for i in range(100))
 PATIENCE = 30.0  # s of wall time; generous, for machines that are busy
 
 
@@ -79,11 +82,15 @@ class Client:
         self._executor.add_node(self.node)
         self.messages: dict[str, list[Any]] = {}
         self._publishers: dict[str, Any] = {}
+        self._action_clients: dict[str, ActionClient] = {}
 
-    def watch(self, topic: str, kind: type) -> list[Any]:
-        """List that fills with the messages of a topic."""
+    def watch(self, topic: str, kind: type, latched: bool = False) -> list[Any]:
+        """List that fills with the messages of a topic, with the last one from before if that is latched."""
         kept = self.messages.setdefault(topic, [])
-        self.node.create_subscription(kind, topic, kept.append, QoSProfile(depth=1000))
+        profile = QoSProfile(depth=1000)
+        if latched:
+            profile.durability = DurabilityPolicy.TRANSIENT_LOCAL
+        self.node.create_subscription(kind, topic, kept.append, profile)
         return kept
 
     def spin(self, seconds: float) -> None:
@@ -125,6 +132,14 @@ class Client:
         self.node.destroy_client(client)
         return future.result()
 
+    def send_goal(self, kind: type, name: str, **goal: Any) -> "Goal":
+        """Goal of an action, once it is accepted."""
+        if name not in self._action_clients:
+            self._action_clients[name] = ActionClient(self.node, kind, name)
+        actions = self._action_clients[name]
+        self.until(actions.server_is_ready, f"action {name}")
+        return Goal(self, actions, kind.Goal(**goal))
+
     def publish(self, topic: str, message: Any) -> None:
         """Publish, once somebody listens."""
         if topic not in self._publishers:
@@ -150,8 +165,35 @@ class Client:
     def close(self) -> None:
         """Leave the domain."""
         self._executor.shutdown()
+        for actions in self._action_clients.values():
+            actions.destroy()
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
+
+
+class Goal:
+    """A goal of an action: its feedback, its end, its cancellation."""
+
+    def __init__(self, client: Client, actions: ActionClient, goal: Any) -> None:
+        self._client = client
+        self.feedback: list[Any] = []
+        sent = actions.send_goal_async(goal, lambda message: self.feedback.append(message.feedback))
+        client.until(sent.done, "the acceptance of a goal")
+        self._handle = sent.result()
+        assert self._handle.accepted
+        self._result = self._handle.get_result_async()
+
+    def cancel(self) -> Any:
+        """Ask for its end; the response."""
+        asked = self._handle.cancel_goal_async()
+        self._client.until(asked.done, "the answer to a cancel request")
+        return asked.result()
+
+    def end(self) -> tuple[int, Any]:
+        """Status and result, once it has ended."""
+        self._client.until(self._result.done, "the end of a goal")
+        answer = self._result.result()
+        return answer.status, answer.result
 
 
 class World:

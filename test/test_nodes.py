@@ -1,8 +1,6 @@
 """The nodes as a user meets them: real processes, real DDS on loopback."""
 
-import itertools
 import math
-import os
 import re
 import signal
 import subprocess
@@ -17,7 +15,7 @@ rclpy = pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import Point, Vector3  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
-from ros_harness import EXECUTABLES, controls_message, environment, swashplate_message, world  # noqa: E402
+from ros_harness import DOMAINS, EXECUTABLES, controls_message, environment, swashplate_message, world  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
@@ -33,7 +31,6 @@ from sbs_msgs.msg import (  # noqa: E402
 from sbs_msgs.srv import Reset, SetWind, Step  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 
-DOMAINS = itertools.cycle(1 + (os.getpid() + i) % 100 for i in range(100))
 TOPICS = {
     "state": BodyState,
     "rotors": RotorStateArray,
@@ -434,10 +431,10 @@ def test_a_wrong_parameter_stops_the_node_with_one_line(own_world, parameters, s
     assert said in lines[0]
 
 
-def test_a_broken_aircraft_file_stops_either_node_with_one_line(own_world):
+def test_a_broken_aircraft_file_stops_every_node_with_one_line(own_world):
     path = own_world.folder / "broken.yaml"
     path.write_text("name: broken\nrotors: []\n")
-    for name in ("simulator", "control_mixer"):
+    for name in ("simulator", "control_mixer", "analysis"):
         process = own_world.start(name, aircraft=str(path))
         assert process.wait() == 1
         assert len(process.output.strip().splitlines()) == 1
@@ -457,10 +454,10 @@ def test_nodes_yaml_holds_the_defaults_of_every_parameter():
     from ruamel.yaml import YAML
 
     from sbs_sim.aircraft import config_folder
-    from sbs_sim.nodes import control_mixer, simulator
+    from sbs_sim.nodes import analysis, control_mixer, simulator
 
     written = YAML(typ="safe").load((config_folder() / "nodes.yaml").read_text())
-    for name, module in (("simulator", simulator), ("control_mixer", control_mixer)):
+    for name, module in (("simulator", simulator), ("control_mixer", control_mixer), ("analysis", analysis)):
         declared = {key: parameter.default for key, parameter in module.PARAMETERS.items()}
         assert written[name]["ros__parameters"] == declared
 

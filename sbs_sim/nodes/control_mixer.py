@@ -11,13 +11,12 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter as ROSParameter
 
-from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
+from sbs_msgs.msg import Controls, SwashplateArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.mixer import Mixer
-from sbs_sim.model.state import SWASHPLATE_NAMES
-from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, to_time
+from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, swashplate_messages, to_time
 from sbs_sim.nodes.host import (
     COMMAND_QOS,
     COMPLAINT_PERIOD,
@@ -25,6 +24,7 @@ from sbs_sim.nodes.host import (
     STATE_QOS,
     Component,
     Parameter,
+    Refusals,
     declare,
     diagnostic,
     run,
@@ -54,8 +54,7 @@ class ControlMixer(Component):
         self._mixer = Mixer(Aircraft.load(declare(self, PARAMETERS)["aircraft"]) if loop is None else loop.aircraft)
         self._resets = 0
         self._moved_at = -1.0
-        self._rejected = 0
-        self._last_problem = ""
+        self._refusals = Refusals(self, "controls")
         self._last_seen: dict[str, float] = {}
         self._output = self.create_publisher(SwashplateArray, "swashplate", COMMAND_QOS)
         self._health = self.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
@@ -83,9 +82,7 @@ class ControlMixer(Component):
             if self._loop is not None and self._mixer.rests:
                 self._mixer.stand(self._loop.swashplate())
         except SbsError as error:
-            self._rejected += 1
-            self._last_problem = str(error)
-            self.get_logger().warning(f"controls rejected: {error}", throttle_duration_sec=COMPLAINT_PERIOD)
+            self._refusals.add(error)
             return
         self._move()
 
@@ -103,7 +100,7 @@ class ControlMixer(Component):
         message = SwashplateArray()
         message.header.stamp = to_time(now)
         message.header.frame_id = FRAME_BODY
-        message.rotors = [Swashplate(**dict(zip(SWASHPLATE_NAMES, row, strict=True))) for row in angles.tolist()]
+        message.rotors = swashplate_messages(angles)
         self._output.publish(message)
         if self._mixer.arrived:
             self._ramp.cancel()
@@ -122,11 +119,7 @@ class ControlMixer(Component):
 
     def _publish_health(self) -> None:
         problems = [(DiagnosticStatus.WARN, f"clipped: {text}") for text in self._mixer.saturated]
-        values = {
-            "rate_limited": not self._mixer.arrived,
-            "rejected_messages": self._rejected,
-            "last_rejection": self._last_problem or "none",
-        }
+        values = {"rate_limited": not self._mixer.arrived, **self._refusals.values()}
         message = DiagnosticArray(status=[diagnostic("control_mixer", problems, values)])
         message.header.stamp = to_time(self._now())
         self._health.publish(message)

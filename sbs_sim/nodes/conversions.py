@@ -19,17 +19,26 @@ from sbs_msgs.msg import (
     Controls,
     Inflow,
     InflowArray,
+    LinearModel,
+    Mode,
+    NamedMatrix,
     RotorState,
     RotorStateArray,
+    Swashplate,
     SwashplateArray,
+    SweepPoint,
+    TrimCondition,
+    TrimPoint,
 )
 from sbs_msgs.srv import SetWind
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis import linearize, modes, sweep, trim
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
+from sbs_sim.model.average import averaged_derivative
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.wind import LARGEST_WIND, Wind
-from sbs_sim.simulation import Snapshot, blade_angles
+from sbs_sim.simulation import Snapshot, blade_angles, trimmed_state
 
 Array = NDArray[np.float64]
 
@@ -57,6 +66,11 @@ def swashplate_array(message: SwashplateArray) -> Array:
     """Swashplate angles [rad], shape (n_rotors, 3)."""
     angles = [[getattr(rotor, name) for name in S.SWASHPLATE_NAMES] for rotor in message.rotors]
     return np.array(angles, dtype=float).reshape(-1, len(S.SWASHPLATE_NAMES))
+
+
+def swashplate_messages(angles: Array) -> list[Swashplate]:
+    """One message per rotor of swashplate angles [rad], shape (n_rotors, 3)."""
+    return [Swashplate(**dict(zip(S.SWASHPLATE_NAMES, row, strict=True))) for row in angles.tolist()]
 
 
 def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
@@ -189,3 +203,124 @@ def enu_flu_quaternion(ned_frd: Sequence[float]) -> tuple[float, float, float, f
 
 def _set_quaternion(target: Quaternion, values: Sequence[float]) -> None:
     target.w, target.x, target.y, target.z = values
+
+
+# ------------------------------------------------------------------------------------------------ trims and models
+
+
+def trim_message(aircraft: Aircraft, point: trim.TrimPoint) -> TrimPoint:
+    """Message of a trim."""
+    rotors = StateMessages(aircraft)
+    rotors.fill(_mean_snapshot(aircraft, point))
+    return TrimPoint(
+        condition=_condition_message(point),
+        controls=Controls(**dict(zip(S.CONTROL_NAMES, point.controls.tolist(), strict=True))),
+        roll=point.roll,
+        pitch=point.pitch,
+        swashplate=swashplate_messages(point.swashplate),
+        rotors=rotors.rotors.rotors,
+        inflow=rotors.inflow.rotors,
+        state_names=point.state_names,
+        state=_doubles(point.state),
+        thrust=float(point.thrust.sum()),
+        power=float(point.power.sum()),
+        residual=point.residual,
+        iterations=point.iterations,
+        inner_iterations=point.inner_iterations,
+        beyond_limits=point.beyond_limits,
+    )
+
+
+def _condition_message(point: trim.TrimPoint) -> TrimCondition:
+    condition = point.condition
+    return TrimCondition(
+        airspeed=float(condition.airspeed),
+        climb_rate=float(condition.climb_rate),
+        sideslip=float(condition.sideslip),
+        turn_rate=float(condition.turn_rate),
+        lead_lag=point.lead_lag,
+        cyclic_inflow=point.cyclic_inflow,
+        azimuth_count=point.azimuth_count,
+        method=point.method,
+    )
+
+
+def _mean_snapshot(aircraft: Aircraft, point: trim.TrimPoint) -> Snapshot:
+    """Trim as the instant at which the first blades are aft, with the mean loads of a revolution."""
+    count = len(aircraft.rotors)
+    params = aircraft.params(point.lead_lag, point.cyclic_inflow)
+    state, still_air, azimuths = trimmed_state(aircraft, point), np.zeros(3), point.azimuth_count
+    slope, loads = np.zeros_like(state), np.zeros((count, P.LOAD_SIZE))
+    averaged_derivative(params, state, point.swashplate, azimuths, still_air, P.make_work(params), slope, loads)
+    return Snapshot(
+        step=0,
+        time=0.0,
+        state=state,
+        acceleration=np.zeros(3),
+        swashplate=point.swashplate,
+        azimuth=np.zeros(count),
+        loads=loads,
+        wind=still_air,
+    )
+
+
+def model_message(aircraft: Aircraft, model: linearize.LinearModel) -> LinearModel:
+    """Message of a linear model with its modes."""
+    return LinearModel(
+        state_names=model.state_names,
+        state_units=model.state_units,
+        control_names=model.control_names,
+        control_units=model.control_units,
+        a=_doubles(model.a),
+        b=_doubles(model.b),
+        output_names=model.output_names,
+        output_units=model.output_units,
+        c=_doubles(model.c),
+        d=_doubles(model.d),
+        trim=trim_message(aircraft, model.trim),
+        modes=[_mode_message(mode) for mode in model.modes],
+        azimuth_spread=model.azimuth_spread,
+        steps=_doubles(model.steps),
+        method=model.method,
+        parameter_hash=model.parameter_hash,
+        blocks=[_matrix_message(name, matrix) for name, matrix in model.blocks.items()],
+    )
+
+
+def _mode_message(mode: modes.Mode) -> Mode:
+    return Mode(
+        name=mode.name,
+        real=mode.pole.real,
+        imag=mode.pole.imag,
+        frequency=mode.frequency,
+        damping=mode.damping,
+        time_to_half=mode.time_to_half,
+        time_to_double=mode.time_to_double,
+        participation=_doubles(mode.participation),
+    )
+
+
+def _matrix_message(name: str, matrix: Array) -> NamedMatrix:
+    rows, columns = matrix.shape
+    return NamedMatrix(name=name, rows=rows, columns=columns, data=_doubles(matrix))
+
+
+def sweep_messages(aircraft: Aircraft, swept: sweep.Sweep) -> list[SweepPoint]:
+    """Messages of all points of a sweep, with or without a result."""
+    return [_sweep_point_message(_aircraft_at(aircraft, swept.parameter, point), point) for point in swept.points]
+
+
+def _aircraft_at(aircraft: Aircraft, parameter: str, point: sweep.SweepPoint) -> Aircraft:
+    """Aircraft of a point: another one where a value of its file is swept."""
+    if parameter in sweep.CONDITIONS or point.trim is None:
+        return aircraft
+    return aircraft.with_value(parameter, point.value)
+
+
+def _sweep_point_message(aircraft: Aircraft, point: sweep.SweepPoint) -> SweepPoint:
+    message = SweepPoint(value=point.value, success=point.error is None, message=point.error or "")
+    if point.trim is not None:
+        message.trim = trim_message(aircraft, point.trim)
+    if point.model is not None:
+        message.model = model_message(aircraft, point.model)
+    return message

@@ -6,6 +6,9 @@ They import next to nothing, so that Ctrl-C is obeyed at once while the compiled
 import os
 import signal
 
+# The matrices are small: threads of numpy and scipy would gain nothing, and take the cores that the flight needs.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 
 def simulator() -> None:
     """Run the executable `simulator`."""
@@ -19,6 +22,14 @@ def control_mixer() -> None:
     """Run the executable `control_mixer`."""
     _end_at_once_when_interrupted()
     from sbs_sim.nodes.control_mixer import main
+
+    main()
+
+
+def analysis() -> None:
+    """Run the executable `analysis`."""
+    _end_at_once_when_interrupted()
+    from sbs_sim.nodes.analysis import main
 
     main()
 

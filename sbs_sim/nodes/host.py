@@ -1,6 +1,7 @@
 """What every executable does alike: start ROS, run nodes, end cleanly; declare parameters; report health."""
 
 import array
+import os
 import signal
 import sys
 import threading
@@ -17,7 +18,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter as ROSParameter
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
 from sbs_sim.errors import SbsError
@@ -26,7 +27,10 @@ STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 HEALTH_PERIOD = 1.0  # s of wall time between diagnostics
 COMPLAINT_PERIOD = 1.0  # s between complaints about bad input
 STOP_PERIOD = 0.2  # s, longest time that a thread takes to see the end
+END_PATIENCE = 3.0  # s that a thread may take to end
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+# the last message is kept for whoever comes later
+LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @dataclass(frozen=True)
@@ -52,10 +56,64 @@ class Parameter:
 
 
 class Component(Node):
-    """A node of this package."""
+    """A node of this package.
+
+    Attributes
+    ----------
+    workers : list of Thread
+        Threads of its own that `stop` lets end.
+    """
+
+    def __init__(self, name: str, **options: Any) -> None:
+        super().__init__(name, **options)
+        self.workers: list[threading.Thread] = []
 
     def stop(self) -> None:
         """Let go of what a callback may be waiting for; called once, before the node's thread is joined."""
+
+    def answer(self, response: Any, act: Callable[[], Any], done: str) -> Any:
+        """Carry out a request and say how it went; an error changes nothing and is told."""
+        try:
+            act()
+        except SbsError as error:
+            response.success, response.message = False, str(error)
+        except Exception as error:  # an error of ours must not end the flight of others
+            self.get_logger().error(f"internal error: {traceback.format_exc()}")
+            response.success, response.message = False, f"internal error, see the log: {error!r}"
+        else:
+            response.success, response.message = True, done
+        return response
+
+
+class Refusals:
+    """Counts the messages that a node has refused, and says why, at most once a second.
+
+    Parameters
+    ----------
+    node : Node
+    what : str
+        Name of the messages.
+
+    Attributes
+    ----------
+    count : int
+    """
+
+    def __init__(self, node: Node, what: str) -> None:
+        self._node, self._what = node, what
+        self.count = 0
+        self._last = "none"
+
+    def add(self, reason: Exception) -> None:
+        """Count one."""
+        self.count += 1
+        self._last = str(reason)
+        log = self._node.get_logger()
+        log.warning(f"{self._what} rejected: {reason}", throttle_duration_sec=COMPLAINT_PERIOD)
+
+    def values(self) -> dict[str, Any]:
+        """What diagnostics tell of them."""
+        return {"rejected_messages": self.count, "last_rejection": self._last}
 
 
 def declare(node: Node, parameters: dict[str, Parameter]) -> dict[str, Any]:
@@ -117,7 +175,8 @@ def run(make_nodes: Callable[[], list[Component]], args: list[str] | None = None
     """Run nodes until they are interrupted; the exit code of the process.
 
     Every node has a thread and an executor of its own, so that a long service of one does not delay the messages of
-    another. (rclpy's multi-threaded executor would do the same at many times the load.)
+    another. (rclpy's multi-threaded executor would do the same at many times the load, and callbacks that compute side
+    by side keep the flight from its cores.)
 
     Parameters
     ----------
@@ -158,8 +217,11 @@ def run(make_nodes: Callable[[], list[Component]], args: list[str] | None = None
         stop.set()
         for node in nodes:
             node.stop()
+            threads += node.workers
         for thread in threads:
-            thread.join()
+            thread.join(END_PATIENCE)
+        if any(thread.is_alive() for thread in threads):
+            os._exit(0)  # deep in a computation, which cannot be interrupted and whose result nobody wants any more
         for node in reversed(nodes):
             node.destroy_node()
         rclpy.try_shutdown()

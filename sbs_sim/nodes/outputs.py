@@ -13,7 +13,7 @@ from rosgraph_msgs.msg import Clock
 from sbs_msgs.msg import BodyState, InflowArray, RotorStateArray, SimulationStatus
 from sbs_sim.flight_loop import FlightLoop, Report
 from sbs_sim.nodes.conversions import StateMessages, to_time
-from sbs_sim.nodes.host import HEALTH_PERIOD, STATE_QOS, diagnostic
+from sbs_sim.nodes.host import HEALTH_PERIOD, STATE_QOS, Refusals, diagnostic
 
 
 class Outputs:
@@ -24,14 +24,15 @@ class Outputs:
     node : Node
         Owner of the publishers.
     loop : FlightLoop
+    refusals : Refusals
+        Commands that the simulator has refused.
     """
 
-    def __init__(self, node: Node, loop: FlightLoop) -> None:
-        self._node, self._loop = node, loop
+    def __init__(self, node: Node, loop: FlightLoop, refusals: Refusals) -> None:
+        self._node, self._loop, self._refusals = node, loop, refusals
         self._messages = StateMessages(loop.aircraft)
         self._clock_message, self._status = Clock(), SimulationStatus()
         self._last_report: Report | None = None
-        self._rejected, self._last_rejection = 0, ""
         self._state = node.create_publisher(BodyState, "state", STATE_QOS)
         self._rotors = node.create_publisher(RotorStateArray, "rotors", STATE_QOS)
         self._inflow = node.create_publisher(InflowArray, "inflow", STATE_QOS)
@@ -43,11 +44,6 @@ class Outputs:
         node.create_timer(HEALTH_PERIOD, self._publish_health, clock=steady)
         self._thread = threading.Thread(target=self._publish_all, name="publisher", daemon=True)
         self._thread.start()
-
-    def count_rejection(self, reason: str) -> None:
-        """Count a refused command and keep why."""
-        self._rejected += 1
-        self._last_rejection = reason
 
     def join(self) -> None:
         """Wait until the last report of a stopped loop is out."""
@@ -77,7 +73,7 @@ class Outputs:
         status.missed_deadlines = report.missed_deadlines
         status.steps = report.step
         status.dropped_messages = report.dropped
-        status.rejected_messages = self._rejected
+        status.rejected_messages = self._refusals.count
         status.fault = report.fault
         self._status_topic.publish(status)
 
@@ -104,8 +100,7 @@ class Outputs:
             "sim_time": f"{report.time:.3f}",
             "real_time_factor": f"{report.real_time_factor:.4f}",
             "missed_deadlines": report.missed_deadlines,
-            "rejected_messages": self._rejected,
-            "last_rejection": self._last_rejection or "none",
+            **self._refusals.values(),
         }
         message = DiagnosticArray(status=[diagnostic("simulator", problems, values)])
         message.header.stamp = to_time(report.time)

@@ -1,13 +1,11 @@
 """Node `simulator`: flies an aircraft in real time.
 
 Publishes `state`, `rotors`, `inflow`, `odom`, `/clock`, `status`, `diagnostics`; subscribes `swashplate`; serves
-`pause`, `step`, `reset`, `set_wind`. The executable brings up the control mixer in the same process.
+`pause`, `step`, `reset`, `set_wind`. The executable brings up the control mixer and the analysis in the same process.
 """
 
 import math
 import sys
-import traceback
-from collections.abc import Callable
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -21,16 +19,17 @@ from sbs_sim.errors import SbsError, TrimError
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
+from sbs_sim.nodes.analysis import Analysis
 from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
-from sbs_sim.nodes.host import COMMAND_QOS, COMPLAINT_PERIOD, Component, Parameter, declare, run
+from sbs_sim.nodes.host import COMMAND_QOS, Component, Parameter, Refusals, declare, run
 from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.simulation import Simulation, trimmed_state
 
-COMPONENTS = ("simulator", "control_mixer")
+COMPONENTS = ("simulator", "control_mixer", "analysis")
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
-    "components": Parameter(list(COMPONENTS), "Nodes to bring up in this process: simulator, control_mixer"),
+    "components": Parameter(list(COMPONENTS), f"Nodes to bring up in this process: {', '.join(COMPONENTS)}"),
     "airspeed": Parameter(0.0, "Start: horizontal velocity relative to the air [m/s]", -100.0, 100.0),
     "climb_rate": Parameter(0.0, "Start: vertical velocity relative to the air, up positive [m/s]", -50.0, 50.0),
     "sideslip": Parameter(0.0, "Start: angle from heading to track, right positive [rad]", -math.pi, math.pi),
@@ -56,7 +55,7 @@ PARAMETERS = {
 
 
 class Simulator(Component):
-    """See the module."""
+    """See the module. The flight itself begins with `loop.start()`."""
 
     def __init__(self) -> None:
         super().__init__("simulator")
@@ -65,14 +64,14 @@ class Simulator(Component):
         self.aircraft = Aircraft.load(values["aircraft"])
         self._fidelity = {"lead_lag": values["lead_lag"], "cyclic_inflow": values["cyclic_inflow"]}
         self.loop = FlightLoop(self._start(values), values["real_time_factor"], values["command_timeout"])
-        self._outputs = Outputs(self, self.loop)
+        self._refusals = Refusals(self, "swashplate")
+        self._outputs = Outputs(self, self.loop, self._refusals)
         self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
         self.create_service(SetBool, "pause", self._on_pause)
         self.create_service(Step, "step", self._on_step)
         self.create_service(Reset, "reset", self._on_reset)
         self.create_service(SetWind, "set_wind", self._on_set_wind)
         self.add_on_set_parameters_callback(self._on_parameters)
-        self.loop.start()
 
     def _start(self, values: dict[str, Any]) -> Simulation:
         """Simulation in trimmed flight at the condition that the parameters name."""
@@ -109,18 +108,17 @@ class Simulator(Component):
         try:
             self.loop.command(swashplate_array(message))
         except SbsError as error:
-            self._outputs.count_rejection(str(error))
-            self.get_logger().warning(f"swashplate rejected: {error}", throttle_duration_sec=COMPLAINT_PERIOD)
+            self._refusals.add(error)
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         done = "paused" if request.data else "playing"
-        return self._answer(response, lambda: self.loop.pause(request.data), done)
+        return self.answer(response, lambda: self.loop.pause(request.data), done)
 
     def _on_step(self, request: Step.Request, response: Step.Response) -> Step.Response:
         def step() -> None:
             response.sim_time = self.loop.step(request.ticks)
 
-        return self._answer(response, step, f"{request.ticks} ticks")
+        return self.answer(response, step, f"{request.ticks} ticks")
 
     def _on_reset(self, request: Reset.Request, response: Reset.Response) -> Reset.Response:
         def reset() -> None:
@@ -133,10 +131,10 @@ class Simulator(Component):
             state = trimmed_state(self.aircraft, point, position, request.heading, wind)
             self.loop.reset(state, point.swashplate)
 
-        return self._answer(response, reset, "reset")
+        return self.answer(response, reset, "reset")
 
     def _on_set_wind(self, request: SetWind.Request, response: SetWind.Response) -> SetWind.Response:
-        return self._answer(response, lambda: self.loop.set_wind(lambda now: wind_of(request, now)), "wind set")
+        return self.answer(response, lambda: self.loop.set_wind(lambda now: wind_of(request, now)), "wind set")
 
     def _on_parameters(self, parameters: list[Any]) -> SetParametersResult:
         try:
@@ -148,19 +146,6 @@ class Simulator(Component):
         except SbsError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
-
-    def _answer(self, response: Any, act: Callable[[], Any], done: str) -> Any:
-        """Carry out a request and say how it went; an error changes nothing and is told."""
-        try:
-            act()
-        except SbsError as error:
-            response.success, response.message = False, str(error)
-        except Exception as error:  # an error of ours must not end the flight of others
-            self.get_logger().error(f"internal error: {traceback.format_exc()}")
-            response.success, response.message = False, f"internal error, see the log: {error!r}"
-        else:
-            response.success, response.message = True, done
-        return response
 
     def stop(self) -> None:
         """End the flight; whoever waits for it is told so."""
@@ -181,15 +166,20 @@ def checked_components(names: list[str]) -> tuple[str, ...]:
         One is unknown, or the simulator itself is not among them.
     """
     if "simulator" not in names or set(names) - set(COMPONENTS):
-        raise SbsError(f"parameter components = {list(names)}: allowed are simulator, alone or with control_mixer")
+        others = ", ".join(COMPONENTS[1:])
+        raise SbsError(f"parameter components = {list(names)}: allowed are simulator, alone or with {others}")
     return tuple(names)
 
 
 def _nodes() -> list[Component]:
     simulator = Simulator()
-    if "control_mixer" not in simulator.components:
-        return [simulator]
-    return [simulator, ControlMixer(simulator.loop)]
+    nodes: list[Component] = [simulator]
+    if "control_mixer" in simulator.components:
+        nodes.append(ControlMixer(simulator.loop))
+    if "analysis" in simulator.components:
+        nodes.append(Analysis(simulator.aircraft))
+    simulator.loop.start()  # last: what is loaded meanwhile would make it miss deadlines
+    return nodes
 
 
 def main(args: list[str] | None = None) -> None:

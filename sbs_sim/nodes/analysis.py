@@ -1,0 +1,144 @@
+"""Node `analysis`: trims, linear models and sweeps as services and an action.
+
+Serves `trim`, `linearize` and the action `sweep`; publishes the latest results of the services on `trim_point` and
+`linear_model`, for those who come later too. Answers take milliseconds and are given one after the other; a sweep has
+a thread of its own.
+"""
+
+import contextlib
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.action.server import ServerGoalHandle
+
+from sbs_msgs.action import Sweep
+from sbs_msgs.msg import LinearModel, TrimPoint
+from sbs_msgs.srv import Linearize, Trim
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.linearize import linearize
+from sbs_sim.analysis.sweep import SweepPoint, sweep
+from sbs_sim.analysis.trim import trim
+from sbs_sim.errors import SbsError
+from sbs_sim.nodes.conversions import model_message, sweep_messages, trim_message
+from sbs_sim.nodes.host import LATCHED_QOS, Component, Parameter, declare, run
+from sbs_sim.nodes.threaded_action import ThreadedActionServer
+
+PARAMETERS = {
+    "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
+}
+CONDITION = ("airspeed", "climb_rate", "sideslip", "turn_rate", "lead_lag", "cyclic_inflow", "azimuth_count")
+MOST_POINTS = 1000  # of a sweep; its result is one message, some 50 kB for each of them
+TURN_PATIENCE = 2.0  # s that a sweep waits for the end of the one before, which may just have been cancelled
+
+
+class Analysis(Component):
+    """See the module.
+
+    Parameters
+    ----------
+    aircraft : Aircraft, optional
+        The one that flies, if it is in the same process; else a parameter names it.
+    """
+
+    def __init__(self, aircraft: Aircraft | None = None) -> None:
+        super().__init__("analysis")
+        self._aircraft = Aircraft.load(declare(self, PARAMETERS)["aircraft"]) if aircraft is None else aircraft
+        self._sweep_workers = None if aircraft is None else 1  # the other cores fly
+        self._ending = threading.Event()
+        self._turn = threading.Lock()
+        with contextlib.suppress(SbsError):  # load now what the first caller would have to wait for
+            model_message(self._aircraft, linearize(self._aircraft))
+        self._trim_point = self.create_publisher(TrimPoint, "trim_point", LATCHED_QOS)
+        self._linear_model = self.create_publisher(LinearModel, "linear_model", LATCHED_QOS)
+        self.create_service(Trim, "trim", self._on_trim)
+        self.create_service(Linearize, "linearize", self._on_linearize)
+        self._sweeps = ThreadedActionServer(self, Sweep, "sweep", self._sweep, self.workers)
+
+    def stop(self) -> None:
+        """End a sweep after the point that it is at."""
+        self._ending.set()
+
+    def destroy_node(self) -> None:
+        """End the action, which rclpy forgets, then the node."""
+        self._sweeps.destroy()
+        super().destroy_node()
+
+    def _on_trim(self, request: Trim.Request, response: Trim.Response) -> Trim.Response:
+        def act() -> None:
+            point = trim(self._aircraft, **_condition(request), method=request.method)
+            response.trim = trim_message(self._aircraft, point)
+            self._trim_point.publish(response.trim)
+
+        return self.answer(response, act, "trimmed")
+
+    def _on_linearize(self, request: Linearize.Request, response: Linearize.Response) -> Linearize.Response:
+        def act() -> None:
+            model = linearize(self._aircraft, **_condition(request), method=request.method)
+            response.model = model_message(self._aircraft, model)
+            self._linear_model.publish(response.model)
+
+        return self.answer(response, act, "linearized")
+
+    def _sweep(self, goal: ServerGoalHandle) -> Sweep.Result:
+        """Sweep as a goal asks for; in a thread of its own."""
+        result = Sweep.Result()
+        visited = 0
+
+        def tell(point: SweepPoint, _: int, total: int) -> None:
+            nonlocal visited
+            visited += 1
+            goal.publish_feedback(_feedback(point, visited, total))
+
+        def act() -> None:
+            if not self._turn.acquire(timeout=TURN_PATIENCE):
+                raise SbsError("another sweep is under way: cancel it, or wait for its end")
+            try:
+                result.points = self._points(goal, tell)
+            finally:
+                self._turn.release()
+
+        self.answer(result, act, "")
+        if result.success:
+            total, found = len(result.points), sum(point.success for point in result.points)
+            result.success = visited == total
+            result.message = f"{found} of {total} points have a result"
+            if visited < total:
+                result.message = f"cancelled after {visited} of {total} points"
+        return result
+
+    def _points(self, goal: ServerGoalHandle, tell: Callable[[SweepPoint, int, int], None]) -> list[Any]:
+        request = goal.request
+        if len(request.values) > MOST_POINTS:
+            raise SbsError(f"values: {len(request.values)} of them, allowed are 1 to {MOST_POINTS}")
+        swept = sweep(
+            self._aircraft,
+            request.parameter,
+            request.values.tolist(),
+            **_condition(request),
+            linear=request.linear,
+            workers=self._sweep_workers,
+            progress=tell,
+            cancelled=lambda: goal.is_cancel_requested or self._ending.is_set(),
+        )
+        return sweep_messages(self._aircraft, swept)
+
+
+def _condition(request: Any) -> dict[str, Any]:
+    return {name: getattr(request, name) for name in CONDITION}
+
+
+def _feedback(point: SweepPoint, done: int, total: int) -> Sweep.Feedback:
+    return Sweep.Feedback(
+        done=done,
+        total=total,
+        last_value=point.value,
+        last_success=point.error is None,
+        last_message=point.error or "",
+    )
+
+
+def main(args: list[str] | None = None) -> None:
+    """Serve until interrupted."""
+    sys.exit(run(lambda: [Analysis()], args))

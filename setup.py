@@ -38,6 +38,11 @@ setup(
         "console_scripts": [
             "simulator = sbs_sim.nodes.executables:simulator",
             "control_mixer = sbs_sim.nodes.executables:control_mixer",
+            "analysis = sbs_sim.nodes.executables:analysis",
+            "trim = sbs_sim.commands.trim:main",
+            "linearize = sbs_sim.commands.linearize:main",
+            "sweep = sbs_sim.commands.sweep:main",
+            "reproduce = sbs_sim.commands.reproduce:main",
         ],
     },
 )

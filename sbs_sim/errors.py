@@ -35,3 +35,11 @@ class LinearizationError(SbsError):
 
 class SimulationError(SbsError):
     """A simulation that cannot start or cannot go on."""
+
+
+class SweepError(SbsError):
+    """A sweep that cannot start."""
+
+
+class ExportError(SbsError):
+    """A file that cannot be written."""

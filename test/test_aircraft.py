@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from sbs_sim import Aircraft, simulate, trim
 from sbs_sim.aircraft import Rotor, config_folder
+from sbs_sim.aircraft_values import unit_of
 from sbs_sim.errors import AircraftError
 from sbs_sim.model.state import CONTROL_NAMES, RATES, VELOCITY
 
@@ -757,6 +758,179 @@ def test_no_change_of_the_text_gets_more_than_an_aircraft_error(tmp_path, place,
     if isinstance(result, str):
         assert result.startswith(f"{path}: ")
         assert "\n" not in result
+
+
+# -- single values ----------------------------------------------------------------------------------
+
+
+def path_text(path):
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+
+
+def same_arrays(one, other):
+    return all(np.array_equal(a, b) for a, b in zip(one.params(), other.params(), strict=True))
+
+
+def value_refusal(path, value):
+    with pytest.raises(AircraftError) as caught:
+        Aircraft.from_dict(sbs_data()).with_value(path, value)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+VARIANTS = {
+    "body.mass": (("body", "mass"), 25.0),
+    "environment.air_density": (("environment", "air_density"), 1.0),
+    "options.elements": (("options", "elements"), 30),
+    "body.inertia[0][0]": (("body", "inertia", 0, 0), 3.6),
+    "body.flat_plate_areas": (("body", "flat_plate_areas"), [0.0, 0.0, 0.1]),
+    "rotors[0].blade_mass": (("rotors", 0, "blade_mass"), 0.2),
+    "rotors.MR2.hub[2]": (("rotors", 1, "hub", 2), 0.1),
+    "rotors[1].chord.tip": (("rotors", 1, "chord", "tip"), 0.04),
+    # a key that the file leaves out
+    "rotors.MR1.mixing.collective.lateral_cyclic": (("rotors", 0, "mixing", "collective", "lateral_cyclic"), 0.1),
+}
+
+
+@pytest.mark.parametrize(("text", "change"), VARIANTS.items(), ids=VARIANTS)
+def test_an_aircraft_with_another_value_is_that_of_the_changed_file(sbs, text, change):
+    before = copy.deepcopy(sbs.data)
+    variant = sbs.with_value(text, change[1])
+    changed_file = Aircraft.from_dict(changed(*change))
+    assert same_arrays(variant, changed_file)
+    assert variant.data == changed_file.data
+    assert variant.parameter_hash != sbs.parameter_hash
+    assert variant.value(text) == change[1]
+    assert sbs.data == before
+    assert sbs.with_value(text, change[1]).with_value("body.mass", 30.0).body.mass == 30.0
+
+
+def test_a_key_of_the_rotors_is_that_of_every_rotor(sbs):
+    variant = sbs.with_value("rotors.twist_deg.tip", -8.0)
+    assert [rotor.twist_tip for rotor in variant.rotors] == [math.radians(-8.0)] * 2
+    assert variant.value("rotors.twist_deg.tip") == [-8.0, -8.0]
+    # the file makes both rotors of one mapping, so that they share what they have in common
+    assert [rotor.hub[0] for rotor in sbs.with_value("rotors[1].hub[0]", 0.01).rotors] == [0.0, 0.01]
+
+
+def test_a_rotor_whose_name_is_a_key_is_found_by_its_index():
+    aircraft = Aircraft.from_dict(changed(("rotors", 1, "name"), "radius"))
+    assert [rotor.radius for rotor in aircraft.with_value("rotors.radius", 0.6).rotors] == [0.6, 0.6]
+    assert [rotor.radius for rotor in aircraft.with_value("rotors[1].radius", 0.6).rotors] == [0.505, 0.6]
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in all_paths(SBS) if type(get(SBS, path)) in (int, float)], ids=path_text
+)
+def test_every_number_can_be_set_and_has_a_unit(sbs, path):
+    value = get(SBS, path)
+    assert sbs.value(path_text(path)) == value
+    assert sbs.with_value(path_text(path), np.float64(value)).parameter_hash == sbs.parameter_hash
+    assert unit_of(path_text(path))
+
+
+@pytest.mark.parametrize(
+    ("path", "unit"),
+    [
+        ("body.mass", "kg"),
+        ("rotors.MR1.hub[0]", "m"),
+        ("rotors[0].twist_deg.tip", "deg"),
+        ("rotors.speed_rpm", "rpm"),
+        ("controls.collective.range_deg[1]", "deg"),
+        ("rotors.blades", "1"),
+        ("name", ""),
+    ],
+)
+def test_units_of_values(path, unit):
+    assert unit_of(path) == unit
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [("body.mass", 25.0), ("rotors.blade_mass", 0.2), ("rotors.radius", 0.55), ("rotors[1].chord.tip", 0.04)],
+)
+def test_an_airfoil_that_stays_the_same_is_not_read_again(sbs, monkeypatch, path, value):
+    monkeypatch.setattr("sbs_sim.aircraft.read_table", None)
+    assert sbs.with_value(path, value).airfoils["naca0012"] is sbs.airfoils["naca0012"]
+
+
+def test_a_partial_airfoil_is_extended_for_the_new_blade(tmp_path):
+    (tmp_path / "wing.csv").write_text(POLAR)
+    data = sbs_data()
+    for rotor in data["rotors"]:
+        rotor["airfoil"] = "wing"
+    aircraft = Aircraft.from_dict(data, tmp_path)
+    assert aircraft.with_value("body.mass", 21.0).airfoils["wing"] is aircraft.airfoils["wing"]
+    slender = aircraft.with_value("rotors.radius", 1.0)
+    for rotor in data["rotors"]:
+        rotor["radius"] = 1.0
+    assert np.array_equal(slender.airfoils["wing"].cd, Aircraft.from_dict(data, tmp_path).airfoils["wing"].cd)
+    assert slender.airfoils["wing"].cd.max() > aircraft.airfoils["wing"].cd.max()
+
+
+def test_another_airfoil_is_read(sbs):
+    variant = sbs.with_value("rotors.airfoil", "linear_573")
+    assert list(variant.airfoils) == ["linear_573"]
+
+
+def test_an_aircraft_of_a_relative_path_can_be_changed_from_elsewhere(tmp_path, monkeypatch):
+    (tmp_path / "wing.csv").write_text(POLAR)
+    (tmp_path / "mine.yaml").write_text(SBS_TEXT)
+    monkeypatch.chdir(tmp_path)
+    aircraft = Aircraft.load("mine.yaml")
+    monkeypatch.chdir("/")
+    assert list(aircraft.with_value("rotors.airfoil", "wing").airfoils) == ["wing"]
+
+
+KEYS_OF_BODY = "unknown key, allowed are mass, inertia, flat_plate_areas"
+REFUSED_VALUES = {
+    "unknown key": ("body.mas", 1.0, f"body.mas: {KEYS_OF_BODY}"),
+    "unknown part": ("bodi.mass", 1.0, "bodi: unknown key, allowed are name, description, environment, "),
+    "unknown rotor": ("rotors.MR3.radius", 1.0, "rotors.MR3: allowed are [0] to [1], MR1, MR2, name, hub, "),
+    "unknown key of a rotor": ("rotors[1].radios", 1.0, "rotors[1].radios: unknown key, allowed are name, hub, "),
+    "index too large": ("rotors[2].radius", 1.0, "rotors[2]: allowed are [0] to [1]"),
+    "index of an inertia too large": ("body.inertia[0][3]", 1.0, "body.inertia[0][3]: allowed are [0] to [2]"),
+    "key of a list": ("body.inertia.x", 1.0, "body.inertia.x: allowed are [0] to [2]"),
+    "index of a mapping": ("body[0]", 1.0, f"body[0]: {KEYS_OF_BODY}"),
+    "part of a number": ("body.mass.x", 1.0, "body.mass.x: body.mass is a single value"),
+    "no path": ("", 1.0, "path = '': allowed are keys like body.mass"),
+    "not a path": ("body..mass", 1.0, "path = 'body..mass': allowed are keys like body.mass"),
+    "text for a number": ("body.mass", "x", "body.mass = 'x': allowed is a number"),
+    "no number": ("body.mass", math.nan, "body.mass = nan: allowed is a finite number"),
+    "lighter than its blades": ("body.mass", 0.5, "body.mass = 0.5: allowed is > 0.9678, the mass of all blades"),
+    "blades too heavy": (
+        "rotors.blade_mass",
+        3.0,
+        "rotors.blade_mass = 3.0: body.inertia without the blades = [[-4.942583, -0.001, -0.052],"
+        " [-0.001, 1.235867, 0.0], [-0.052, 0.0, -3.9619]]: allowed is a positive definite matrix",
+    ),
+    "out of range in every rotor": (
+        "rotors.tip_loss",
+        2,
+        "rotors.tip_loss = 2: rotors[0].tip_loss = 2: allowed is <= 1; rotors[1].tip_loss = 2: allowed is <= 1",
+    ),
+    "one name for all": ("rotors.name", "R", "rotors.name = 'R': rotors[1].name = 'R': used twice"),
+    "unknown choice": ("options.coupling", "both", "options.coupling = 'both': allowed is one of complete, paper"),
+    "number for a part": ("body", 3, "body = 3: allowed is a mapping of keys to values"),
+}
+
+
+@pytest.mark.parametrize(("path", "value", "line"), REFUSED_VALUES.values(), ids=REFUSED_VALUES)
+def test_a_value_that_cannot_be_set_is_refused_in_one_line(path, value, line):
+    said = value_refusal(path, value)
+    assert said.startswith(line) if line.endswith(", ") or "like" in line else said == line
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.sampled_from([path_text(path) for path in all_paths(SBS)]) | st.text(max_size=8) | st.text("rotbdymas.[]01"),
+    VALUES,
+)
+@example("rotors[99999999999999999999]", 1)
+def test_no_value_at_no_path_gets_more_than_an_aircraft_error(sbs, path, value):
+    result = line_or_aircraft(sbs.with_value, path, value)
+    if not isinstance(result, str):
+        assert all(np.isfinite(array).all() for array in result.params())
 
 
 # -- aircraft of other shapes -----------------------------------------------------------------------

@@ -21,6 +21,7 @@ def module_name(path):
 
 MODULES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 LIBRARY = [name for name in MODULES if not name.startswith("sbs_sim.nodes")]
+COMMANDS = [name for name in MODULES if name.startswith("sbs_sim.commands")]
 TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
 
 
@@ -55,6 +56,7 @@ def test_the_search_finds_what_there_is():
     assert {"sbs_sim", "sbs_sim.aircraft", "sbs_sim.model.state", "sbs_sim.nodes.simulator"} <= set(MODULES)
     assert any(is_ros(item) for item in imports_of("sbs_sim.nodes.simulator"))
     assert "sbs_sim.model.params" in imports_of("sbs_sim.aircraft")
+    assert {"sbs_sim.commands.trim", "sbs_sim.commands.linearize", "sbs_sim.commands.sweep"} <= set(COMMANDS)
 
 
 @pytest.mark.parametrize("name", LIBRARY)
@@ -65,7 +67,8 @@ def test_only_nodes_import_ros(name):
 ALLOWED = {
     "sbs_sim.errors": [],
     "sbs_sim.model": ["sbs_sim.model", "sbs_sim.errors"],
-    "sbs_sim.aircraft": ["sbs_sim.model", "sbs_sim.errors"],
+    "sbs_sim.aircraft_values": ["sbs_sim.errors"],
+    "sbs_sim.aircraft": ["sbs_sim.aircraft_values", "sbs_sim.model", "sbs_sim.errors"],
     "sbs_sim.mixer": ["sbs_sim.aircraft", "sbs_sim.model", "sbs_sim.errors"],
 }
 FORBIDDEN = {
@@ -97,7 +100,12 @@ def test_the_model_knows_nothing_of_the_time_of_day(name):
     assert not imports_of(name) & {"time", "datetime", "threading", "asyncio"}
 
 
-@pytest.mark.parametrize("name", LIBRARY)
+@pytest.mark.parametrize("name", [name for name in MODULES if name not in COMMANDS])
+def test_nothing_stands_on_the_commands(name):
+    assert [item for item in own_imports(name) if within(item, ["sbs_sim.commands"])] == []
+
+
+@pytest.mark.parametrize("name", [name for name in LIBRARY if name not in COMMANDS])
 def test_the_library_does_not_print(name):
     calls = [node for node in ast.walk(TREES[name]) if isinstance(node, ast.Call)]
     printing = [call.lineno for call in calls if isinstance(call.func, ast.Name) and call.func.id == "print"]

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+EXECUTABLES = "simulator control_mixer analysis trim linearize sweep reproduce"
 
 # What the script itself calls; everything else is taken away from it.
 SCRIPT_TOOLS = (
@@ -85,7 +86,7 @@ def assert_one_line(result, *parts):
 def test_help_names_the_executables(clone):
     result = clone.call("--help")
     assert result.returncode == 0
-    assert "executables: simulator control_mixer" in result.stdout
+    assert f"executables: {EXECUTABLES}\n" in result.stdout
     assert all(f"./run {command}" in result.stdout for command in ("build", "test", "shell", "python"))
 
 
@@ -100,7 +101,7 @@ def test_unknown_executable_is_told_without_building(clone, name):
     result = clone.call(name)
     assert result.returncode == 2
     if name:
-        assert result.stderr == f'run: no executable "{name}"; there are: simulator control_mixer\n'
+        assert result.stderr == f'run: no executable "{name}"; there are: {EXECUTABLES}\n'
     assert not (clone.folder / ".venv").exists()
     assert not (clone.folder / "log").exists()
 

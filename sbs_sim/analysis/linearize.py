@@ -8,11 +8,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis import export
 from sbs_sim.analysis.modes import Mode, modes
 from sbs_sim.analysis.trim import TrimPoint, trim
 from sbs_sim.errors import LinearizationError
@@ -181,6 +184,30 @@ class LinearModel:
             for column, control in enumerate(model.control_names):
                 found[f"{symbol}_{control}"] = float(model.b[body[row], column])
         return found
+
+    def save(self, path: str | Path) -> None:
+        """Write the model to a .npz, .mat or .json file, see `sbs_sim.analysis.export.save`.
+
+        Raises
+        ------
+        ExportError
+            Another suffix, or a file that cannot be written.
+        """
+        export.save(self, path)
+
+    def to_control(self) -> Any:
+        """`control.StateSpace` of python-control with the names of states, inputs and outputs.
+
+        Raises
+        ------
+        ExportError
+            python-control is not installed.
+        """
+        return export.to_control(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain lists and numbers for JSON, see `sbs_sim.analysis.export.model_to_dict`."""
+        return export.model_to_dict(self)
 
 
 def linearize(

@@ -6,11 +6,13 @@ the six body accelerations, of the flap and lag accelerations and of the inflow 
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.export import trim_to_dict
 from sbs_sim.errors import TrimError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
@@ -123,6 +125,10 @@ class TrimPoint:
     iterations: int
     inner_iterations: int
     beyond_limits: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain lists and numbers for JSON, by the names of the attributes, with "control_names"."""
+        return trim_to_dict(self)
 
 
 class TrimProblem:

@@ -1,0 +1,243 @@
+"""Trims and linear models as files and for other programs: .npz, .mat, .json, python-control.
+
+Names and places are those of `TrimPoint` and `LinearModel`, SI units and radians; poles, modes and blocks come along.
+"""
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sbs_sim.errors import ExportError
+from sbs_sim.model.state import CONTROL_NAMES
+
+if TYPE_CHECKING:
+    from sbs_sim.analysis.linearize import LinearModel
+    from sbs_sim.analysis.modes import Mode
+    from sbs_sim.analysis.sweep import Sweep
+    from sbs_sim.analysis.trim import TrimPoint
+
+
+def save(model: "LinearModel", path: str | Path) -> None:
+    """Write a linear model to a file of the kind that its suffix says.
+
+    Parameters
+    ----------
+    model : LinearModel
+    path : str or Path
+        ".npz": arrays by name, what belongs to the trim and the blocks as "trim.pitch", "blocks.A_B-B".
+        ".mat": the same for Matlab and Octave, trim and blocks as structures, names as cells; what an identifier
+        cannot hold is an underscore there. ".json": see `model_to_dict`.
+
+    Raises
+    ------
+    ExportError
+        Another suffix, or a file that cannot be written.
+    """
+    path = Path(path)
+    encode = ENCODERS.get(path.suffix.lower())
+    if encode is None:
+        raise ExportError(f"{path}: allowed are names that end in {', '.join(ENCODERS)}")
+    write(path, encode(model))
+
+
+def write(path: str | Path, content: bytes | str) -> None:
+    """Write a file; a text in UTF-8.
+
+    Raises
+    ------
+    ExportError
+        It cannot be written: the message says why.
+    """
+    path = Path(path)
+    try:
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+    except (OSError, ValueError) as error:  # the latter for names that no file can have
+        reason = f"there is no folder {path.parent}" if _no_folder(path.parent) else _reason(error)
+        raise ExportError(f"{path}: cannot be written: {reason}") from None
+
+
+def _no_folder(folder: Path) -> bool:
+    try:
+        return not folder.exists()
+    except (OSError, ValueError):
+        return False
+
+
+def _reason(error: Exception) -> str:
+    return str(getattr(error, "strerror", None) or error)
+
+
+def to_json(data: Any) -> str:
+    """Text of a mapping as JSON; see `plain`."""
+    return json.dumps(plain(data), allow_nan=False) + "\n"
+
+
+def plain(value: Any) -> Any:
+    """Numbers, texts, lists and mappings of them for JSON.
+
+    Arrays and tuples become lists, complex numbers {"real", "imag"}, and None is what is not finite.
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, complex):
+        return {"real": plain(value.real), "imag": plain(value.imag)}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def trim_to_dict(point: "TrimPoint") -> dict[str, Any]:
+    """Trim as plain lists and numbers, by the names of `TrimPoint`; with "control_names"."""
+    return dict(plain(_trim_contents(point)))
+
+
+def model_to_dict(model: "LinearModel", with_trim: bool = True) -> dict[str, Any]:
+    """Linear model as plain lists and numbers, by the names of `LinearModel`.
+
+    Parameters
+    ----------
+    model : LinearModel
+    with_trim : bool
+        False leaves the trim out.
+
+    Returns
+    -------
+    dict
+        With "poles" as {"real", "imag"} [rad/s], and "modes" as mappings with name, real, imag [rad/s], frequency
+        [rad/s], damping, period, time_to_half, time_to_double [s, None where there is none], participation.
+    """
+    contents = {name: value for name, value in _contents(model).items() if not name.startswith("mode_")}
+    if not with_trim:
+        del contents["trim"]
+    return dict(plain({**contents, "modes": [_mode_contents(mode) for mode in model.modes]}))
+
+
+def to_control(model: "LinearModel") -> Any:
+    """Linear model as a `control.StateSpace` of python-control, with names of states, inputs and outputs.
+
+    Raises
+    ------
+    ExportError
+        python-control is not installed.
+    """
+    try:
+        from control import StateSpace  # here, because it is slow to import and optional
+    except ImportError:
+        raise ExportError("python-control is not installed; remedy: pip install control") from None
+    return StateSpace(
+        *(model.a, model.b, model.c, model.d),
+        states=list(model.state_names),
+        inputs=list(model.control_names),
+        outputs=list(model.output_names),
+    )
+
+
+# --- what a file holds ------------------------------------------------------------------------------------------
+
+
+def _fields(record: Any) -> dict[str, Any]:
+    return {field.name: getattr(record, field.name) for field in fields(record)}
+
+
+def _trim_contents(point: "TrimPoint") -> dict[str, Any]:
+    return {**_fields(point), "condition": _fields(point.condition), "control_names": CONTROL_NAMES}
+
+
+def _mode_contents(mode: "Mode") -> dict[str, Any]:
+    names = ("frequency", "damping", "period", "time_to_half", "time_to_double", "participation")
+    pole = {"name": mode.name, "real": mode.pole.real, "imag": mode.pole.imag}
+    return pole | {name: getattr(mode, name) for name in names}
+
+
+def _contents(model: "LinearModel") -> dict[str, Any]:
+    """Everything by name: arrays, numbers, texts, tuples of texts, and mappings of these."""
+    return {
+        **_fields(model),
+        "trim": _trim_contents(model.trim),
+        "poles": model.poles,
+        "mode_names": tuple(mode.name for mode in model.modes),
+        "mode_poles": np.array([mode.pole for mode in model.modes]),
+        "mode_participation": np.array([mode.participation for mode in model.modes]),
+    }
+
+
+def _npz(model: "LinearModel") -> bytes:
+    """Flat names and no pickled objects, so that `numpy.load` reads it as it is."""
+    flat: dict[str, Any] = {}
+
+    def add(prefix: str, contents: Mapping[str, Any]) -> None:
+        for name, value in contents.items():
+            if isinstance(value, Mapping):
+                add(f"{prefix}{name}.", value)
+            else:
+                flat[f"{prefix}{name}"] = np.array(value, dtype=str) if _is_names(value) else np.asarray(value)
+
+    add("", _contents(model))
+    file = io.BytesIO()
+    np.savez_compressed(file, **flat)
+    return file.getvalue()
+
+
+def _mat(model: "LinearModel") -> bytes:
+    from scipy.io import savemat
+
+    file = io.BytesIO()
+    savemat(file, _for_matlab(_contents(model)), long_field_names=True, oned_as="column", do_compression=True)
+    return file.getvalue()
+
+
+def _for_matlab(contents: Mapping[str, Any]) -> dict[str, Any]:
+    """Mappings as structures with names that Matlab allows, names as cells."""
+    result = {}
+    for name, value in contents.items():
+        if isinstance(value, Mapping):
+            value = _for_matlab(value)
+        elif _is_names(value):
+            value = np.array(value, dtype=object)
+        result[re.sub(r"\W", "_", name)] = value
+    return result
+
+
+def _is_names(value: Any) -> bool:
+    return isinstance(value, tuple) and all(isinstance(item, str) for item in value)
+
+
+def _json(model: "LinearModel") -> bytes:
+    return to_json(model_to_dict(model)).encode()
+
+
+ENCODERS: dict[str, Callable[["LinearModel"], bytes]] = {".npz": _npz, ".mat": _mat, ".json": _json}
+
+
+def sweep_to_csv(sweep: "Sweep") -> str:
+    """Table of a sweep: one row for each point, SI units and radians; cells are empty where a point has none.
+
+    Columns: the parameter, attitude, controls, thrust, torque and power of each rotor, the states, the poles of the
+    modes by name, the error.
+    """
+    columns = {f"{sweep.parameter} [{sweep.unit(sweep.parameter)}]": sweep.values}
+    for name in sweep.names:
+        values, unit = sweep[name], sweep.unit(name)
+        if values.ndim == 1:
+            columns[f"{name} [{unit}]"] = values
+        else:
+            columns |= {f"{name}({j + 1}) [{unit}]": column for j, column in enumerate(values.T)}
+    for name, locus in sweep.loci.items():
+        columns |= {f"{name}: real [rad/s]": locus.real, f"{name}: imaginary [rad/s]": locus.imag}
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow([*columns, "error"])
+    for i, point in enumerate(sweep.points):
+        cells = ["" if math.isnan(column[i]) else repr(float(column[i])) for column in columns.values()]
+        writer.writerow([*cells, point.error or ""])
+    return file.getvalue()

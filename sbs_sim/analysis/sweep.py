@@ -1,0 +1,344 @@
+"""Sweeps: trims and linear models along one parameter, on all cores.
+
+Every point is solved for itself, from hover, so that neither the number of workers nor the other points change it.
+"""
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, partial
+from queue import Empty, SimpleQueue
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft_values import unit_of
+from sbs_sim.analysis.export import model_to_dict, trim_to_dict
+from sbs_sim.analysis.linearize import LinearModel, linearize
+from sbs_sim.analysis.modes import Mode
+from sbs_sim.analysis.trim import TrimPoint, trim
+from sbs_sim.errors import AircraftError, SbsError, SweepError
+from sbs_sim.model import state as S
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+CONDITIONS = {"airspeed": "m/s", "climb_rate": "m/s", "sideslip": "rad", "turn_rate": "rad/s"}
+ROTOR_LOADS = {"thrust": "N", "torque": "N m", "power": "W"}
+QUANTITIES = {  # of a trim, beside its states
+    **dict.fromkeys(("pitch", "roll", *S.CONTROL_NAMES), "rad"),
+    **ROTOR_LOADS,
+    **dict.fromkeys(("residual", "iterations"), "1"),
+}
+CANCELLED = "cancelled"
+MOST_WORKERS = 256
+POLL_PERIOD = 0.05  # s between looks whether the caller wants to go on
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """One point of a sweep.
+
+    Attributes
+    ----------
+    value : float
+        Of the parameter.
+    trim : TrimPoint or None
+        None where there is no trim.
+    model : LinearModel or None
+        None where there is no trim, and where linear models were not asked for.
+    error : str or None
+        Why something is missing, in one line; "cancelled" for what was not begun.
+    """
+
+    value: float
+    trim: TrimPoint | None
+    model: LinearModel | None
+    error: str | None
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Trims and linear models along one parameter.
+
+    Attributes
+    ----------
+    parameter : str
+        "airspeed" [m/s], "climb_rate" [m/s], "sideslip" [rad], "turn_rate" [rad/s], or the path of a value of the
+        aircraft file, in its unit.
+    points : tuple of SweepPoint
+        In the order of the values.
+    """
+
+    parameter: str
+    points: tuple[SweepPoint, ...]
+
+    @cached_property
+    def values(self) -> Array:
+        """Of the parameter, shape (n_points,)."""
+        return np.array([point.value for point in self.points])
+
+    @cached_property
+    def shown(self) -> tuple[Array, str]:
+        """Values of the parameter as a person reads them, and their unit: angles of the flight in degrees."""
+        unit = self.unit(self.parameter)
+        if self.parameter in CONDITIONS and unit.startswith("rad"):
+            return np.degrees(self.values), unit.replace("rad", "deg")
+        return self.values, unit
+
+    @cached_property
+    def failed(self) -> tuple[SweepPoint, ...]:
+        """Points with an error."""
+        return tuple(point for point in self.points if point.error is not None)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """What `sweep[name]` knows: attitude, controls, loads of the rotors, residual, iterations, states."""
+        states: dict[str, None] = {}
+        for point in self.points:
+            if point.trim is not None:
+                states |= dict.fromkeys(point.trim.state_names)
+        return (*QUANTITIES, *states)
+
+    def unit(self, name: str) -> str:
+        """Unit of what `sweep[name]` has, and of the parameter; "1" for a plain number, empty where it is not known."""
+        known = CONDITIONS | QUANTITIES | dict(zip(S.LINEAR_BODY_NAMES, S.LINEAR_BODY_UNITS, strict=True))
+        if name in known:
+            return known[name]
+        if name not in self.names:
+            return unit_of(name)
+        part = S.part_of(name)
+        return "1" if part.family == "inflow" else "rad/s" if part.is_rate else "rad"
+
+    def __getitem__(self, name: str) -> Array:
+        """Values of a name along the sweep, NaN where there is no trim.
+
+        Parameters
+        ----------
+        name : str
+            "pitch", "roll" [rad]; a control [rad]; "thrust" [N], "torque" [N m], "power" [W]; "residual",
+            "iterations"; a linear state in its unit.
+
+        Returns
+        -------
+        ndarray, shape (n_points,), of thrust, torque and power (n_points, n_rotors)
+
+        Raises
+        ------
+        KeyError
+            There is none; the message lists those that there are.
+        """
+        if name not in self.names:
+            raise KeyError(f"no {name!r}: there are {', '.join(self.names)}")
+        rows = [_quantity(point.trim, name) for point in self.points]
+        if name in ROTOR_LOADS:
+            return _filled(rows, max(len(row) for row in rows))
+        return _filled(rows, 1)[:, 0]
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """All poles [rad/s], slowest first, shape (n_points, most states of a point); NaN where there are none."""
+        poles = [np.empty(0, complex) if point.model is None else point.model.poles for point in self.points]
+        return _filled(poles, max(len(row) for row in poles))
+
+    @cached_property
+    def modes(self) -> dict[str, tuple[Mode | None, ...]]:
+        """Every mode along the sweep by its name: one for each point, None where there is none of that name.
+
+        The names come from the states that take part in a mode, so they follow it where poles cross. The slowest first,
+        by the median of the frequency.
+        """
+        named = [
+            {} if point.model is None else {mode.name: mode for mode in point.model.modes} for point in self.points
+        ]
+        names = dict.fromkeys(name for point in named for name in point)
+        tracks = {name: tuple(point.get(name) for point in named) for name in names}
+        return dict(sorted(tracks.items(), key=lambda track: _median_frequency(track[1])))
+
+    @cached_property
+    def loci(self) -> dict[str, ComplexArray]:
+        """Pole of every mode along the sweep by its name [rad/s], shape (n_points,); NaN where there is none."""
+        missing = complex(math.nan, math.nan)
+        return {
+            name: np.array([mode.pole if mode else missing for mode in track]) for name, track in self.modes.items()
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain lists and numbers, for JSON; what there is none of is None."""
+        points = [
+            {
+                "value": point.value,
+                "error": point.error,
+                "trim": trim_to_dict(point.trim) if point.trim else None,
+                "model": model_to_dict(point.model, with_trim=False) if point.model else None,
+            }
+            for point in self.points
+        ]
+        return {"parameter": self.parameter, "points": points}
+
+
+Progress = Callable[[SweepPoint, int, int], None]
+
+
+def sweep(
+    aircraft: Aircraft,
+    parameter: str,
+    values: ArrayLike,
+    *,
+    airspeed: float = 0.0,
+    climb_rate: float = 0.0,
+    sideslip: float = 0.0,
+    turn_rate: float = 0.0,
+    lead_lag: bool = True,
+    cyclic_inflow: bool = True,
+    azimuth_count: int = 12,
+    linear: bool = True,
+    workers: int | None = None,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Sweep:
+    """Trim, and linearize, along one parameter.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    parameter : str
+        "airspeed", "climb_rate", "sideslip", "turn_rate", or a path for `Aircraft.with_value`.
+    values : array_like, shape (n_points,)
+        Of the parameter, in any order; in the unit of `sbs_sim.trim` or of the aircraft file.
+    airspeed, climb_rate, sideslip, turn_rate, lead_lag, cyclic_inflow, azimuth_count :
+        See `sbs_sim.trim`; the one that is the parameter is ignored.
+    linear : bool
+        False leaves the linear models out.
+    workers : int, optional
+        Number of threads, one for each core if not given. The results are the same for any number.
+    progress : callable, optional
+        Called with the point, the number of points done and that of all, in the calling thread, as each ends.
+    cancelled : callable, optional
+        Asked several times a second; after a True no further point is begun, and the rest has the error "cancelled".
+
+    Returns
+    -------
+    Sweep
+        Also of points that fail, with their errors.
+
+    Raises
+    ------
+    SweepError
+        No values, one that is not finite, an unknown parameter, no whole number of workers.
+    """
+    numbers = _checked_values(values)
+    _check_parameter(aircraft, parameter)
+    condition = {"airspeed": airspeed, "climb_rate": climb_rate, "sideslip": sideslip, "turn_rate": turn_rate}
+    fidelity = {"lead_lag": lead_lag, "cyclic_inflow": cyclic_inflow, "azimuth_count": azimuth_count}
+    solve = partial(_solve, aircraft, parameter, {**condition, **fidelity}, linear)
+    return Sweep(parameter, tuple(_solve_all(solve, numbers, _checked_workers(workers), progress, cancelled)))
+
+
+def _checked_values(values: ArrayLike) -> list[float]:
+    try:
+        numbers = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise SweepError(f"values = {values!r}: allowed is a list of numbers") from None
+    if numbers.ndim != 1 or numbers.size == 0:
+        raise SweepError(f"values have the shape {numbers.shape}: allowed is a list of at least one number")
+    if not np.isfinite(numbers).all():
+        place = int(np.flatnonzero(~np.isfinite(numbers))[0])
+        raise SweepError(f"values[{place}] = {numbers[place]}: allowed are finite numbers")
+    return [float(value) for value in numbers]
+
+
+def _check_parameter(aircraft: Aircraft, parameter: str) -> None:
+    if parameter in CONDITIONS:
+        return
+    try:
+        aircraft.value(parameter)
+    except AircraftError as error:
+        raise SweepError(f"parameter {parameter!r}: allowed are {', '.join(CONDITIONS)} or a path; {error}") from None
+
+
+def _checked_workers(workers: int | None) -> int:
+    if workers is None:
+        return len(os.sched_getaffinity(0))
+    if isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= MOST_WORKERS:
+        raise SweepError(f"workers = {workers!r}: allowed are whole numbers from 1 to {MOST_WORKERS}")
+    return workers
+
+
+def _solve_all(
+    solve: Callable[[float], SweepPoint],
+    values: Sequence[float],
+    workers: int,
+    progress: Progress | None,
+    cancelled: Callable[[], bool] | None,
+) -> list[SweepPoint]:
+    """Points of all values, in their order."""
+    points: dict[int, SweepPoint] = {}
+    ended: SimpleQueue[Future[SweepPoint]] = SimpleQueue()
+    pool = ThreadPoolExecutor(workers, thread_name_prefix="sweep")
+    try:
+        places = {pool.submit(solve, value): i for i, value in enumerate(values)}
+        for future in places:
+            future.add_done_callback(ended.put)  # at once, if it has ended already or is cancelled
+        stopped = False
+        while len(points) < len(values):
+            try:
+                future = ended.get(timeout=POLL_PERIOD)
+            except Empty:
+                pass
+            else:
+                place = places[future]
+                if future.cancelled():
+                    points[place] = SweepPoint(values[place], None, None, CANCELLED)
+                else:
+                    points[place] = future.result()
+                    if progress is not None:
+                        progress(points[place], len(points), len(values))
+            if not stopped and cancelled is not None and cancelled():
+                stopped = True
+                for future in places:
+                    future.cancel()  # does nothing to those that are being solved
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return [points[i] for i in range(len(values))]
+
+
+def _solve(aircraft: Aircraft, parameter: str, given: dict[str, Any], linear: bool, value: float) -> SweepPoint:
+    """One point, with its error if there is one."""
+    point = None
+    try:
+        if parameter in CONDITIONS:
+            given = {**given, parameter: value}
+        else:
+            aircraft = aircraft.with_value(parameter, value)
+        point = trim(aircraft, **given)
+        return SweepPoint(value, point, linearize(aircraft, point=point) if linear else None, None)
+    except SbsError as error:
+        return SweepPoint(value, point, None, str(error))
+
+
+def _quantity(point: TrimPoint | None, name: str) -> Array:
+    """Values of a name in a trim, shape (n,) with n = 1 for what is not of a rotor; empty without a trim."""
+    if point is None:
+        return np.empty(0)
+    if name in S.CONTROL_NAMES:
+        return point.controls[[S.CONTROL_NAMES.index(name)]]
+    if name in QUANTITIES:
+        return np.atleast_1d(np.asarray(getattr(point, name), dtype=float))
+    return point.state[[i for i, own in enumerate(point.state_names) if own == name]]
+
+
+def _filled(rows: Sequence[NDArray[Any]], width: int) -> NDArray[Any]:
+    """Rows of unequal lengths as one array, filled up with NaN."""
+    result = np.full((len(rows), width), math.nan, dtype=rows[0].dtype)
+    for target, row in zip(result, rows, strict=True):
+        target[: len(row)] = row
+    return result
+
+
+def _median_frequency(track: Sequence[Mode | None]) -> float:
+    return float(np.median([mode.frequency for mode in track if mode]))

@@ -1,0 +1,261 @@
+"""Plots of a sweep: trim curves and root loci. No window and no global state of matplotlib is used.
+
+Colours are those of Okabe and Ito, and cividis, which people see alike who do not see all colours; lines also differ in
+their dashes.
+"""
+
+import io
+import math
+from collections.abc import Sequence
+from itertools import cycle
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation, Text
+from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
+
+from sbs_sim.analysis.export import write
+from sbs_sim.analysis.modes import Mode
+from sbs_sim.analysis.sweep import CONDITIONS, Sweep
+from sbs_sim.errors import ExportError
+from sbs_sim.model.state import CONTROL_NAMES, part_of
+
+Array = NDArray[np.float64]
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+DASHES = ("-", "--", "-.", ":")
+FORMATS = ("png", "svg")
+DOTS_PER_INCH = 150
+LEAST_ANGLE, LEAST_SHARE = 1.0, 0.05  # that an axis covers: deg, share of the largest value
+LABEL_SIZE = 7.5  # points
+SAME_PLACE = 8.0  # pixels between poles that cannot be told apart
+LABEL_ANGLES = (15, -15, 165, -165, 60, -60, 120, -120, 90, -90)  # deg, in the order of preference
+LABEL_DISTANCES = (8, 16, 26, 38, 52, 70, 90, 115)  # points
+
+
+def save_plots(sweep: Sweep, folder: str | Path) -> list[Path]:
+    """Write the trim curves and, where there are linear models, the root loci as PNG and SVG.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    folder : str or Path
+        Made if there is none.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    ExportError
+        Folder or files cannot be written.
+    """
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise ExportError(f"{folder}: no folder can be made there: {getattr(error, 'strerror', error)}") from None
+    figures = {}
+    if any(point.trim for point in sweep.points):
+        figures["trim"] = trim_figure(sweep)
+    if sweep.modes:
+        figures["root_locus"] = root_locus_figure(sweep)
+    written = []
+    for name, figure in figures.items():
+        for kind in FORMATS:
+            written.append(Path(folder) / f"{name}.{kind}")
+            write(written[-1], _drawn(figure, kind))
+    return written
+
+
+def _drawn(figure: Figure, kind: str) -> bytes:
+    file = io.BytesIO()
+    # the same sweep gives the same file
+    metadata = {"Date": None} if kind == "svg" else None
+    figure.savefig(file, format=kind, dpi=DOTS_PER_INCH, metadata=metadata)
+    return file.getvalue()
+
+
+def _parameter_label(sweep: Sweep) -> str:
+    unit = sweep.shown[1]
+    name = sweep.parameter.replace("_", " ") if sweep.parameter in CONDITIONS else sweep.parameter
+    return f"{name} [{unit}]"
+
+
+# --- trim curves ------------------------------------------------------------------------------------------------
+
+
+def trim_figure(sweep: Sweep) -> Figure:
+    """Attitude, controls, thrust and power over the parameter; a cross marks where there is no trim."""
+    figure = Figure(figsize=(10.0, 7.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    (attitude, controls), (thrust, power) = figure.subplots(2, 2)
+    _curves(
+        attitude, sweep, {name: np.degrees(sweep[name]) for name in ("pitch", "roll")}, "attitude [deg]", LEAST_ANGLE
+    )
+    angles = {name.replace("_", " "): np.degrees(sweep[name]) for name in CONTROL_NAMES}
+    _curves(controls, sweep, angles, "pilot controls [deg]", LEAST_ANGLE)
+    _curves(thrust, sweep, _by_rotor(sweep["thrust"]), "thrust [N]", LEAST_SHARE * _largest(sweep["thrust"]))
+    powers = _by_rotor(sweep["power"])
+    if len(powers) > 1:
+        powers["all rotors"] = sweep["power"].sum(axis=1)
+    _curves(power, sweep, powers, "shaft power [W]", LEAST_SHARE * _largest(sweep["power"]))
+    return figure
+
+
+def _largest(values: Array) -> float:
+    return float(np.nanmax(np.abs(values)))
+
+
+def _by_rotor(values: Array) -> dict[str, Array]:
+    return {f"rotor {j + 1}": column for j, column in enumerate(values.T)}
+
+
+def _curves(axes: Axes, sweep: Sweep, curves: dict[str, Array], label: str, least: float) -> None:
+    """Draw curves by name over the parameter on an axis that covers at least so much."""
+    order = np.argsort(sweep.values, kind="stable")
+    shown = sweep.shown[0][order]
+    marker = "o" if len(shown) <= 50 else None
+    for (name, values), colour, dash in zip(curves.items(), cycle(COLOURS), cycle(DASHES), strict=False):
+        axes.plot(shown, values[order], dash, color=colour, marker=marker, markersize=3, linewidth=1.6, label=name)
+    missing = [value for value, point in zip(sweep.shown[0], sweep.points, strict=True) if point.trim is None]
+    if missing:
+        # at the lower edge, whatever the scale
+        axes.plot(
+            missing, [0.02] * len(missing), "x", color="0.4", transform=axes.get_xaxis_transform(), label="no trim"
+        )
+    axes.set_xlabel(_parameter_label(sweep))
+    axes.set_ylabel(label)
+    low, high = axes.get_ylim()
+    if high - low < least:  # or rounding would fill the panel
+        axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+    axes.grid(True, color="0.85", linewidth=0.6)
+    axes.legend(fontsize=8, framealpha=0.85)
+
+
+# --- root loci --------------------------------------------------------------------------------------------------
+
+
+def root_locus_figure(sweep: Sweep) -> Figure:
+    """Poles of the body's modes, and of the rotors' and inflow's, over the upper half plane, with their names."""
+    figure = Figure(figsize=(14.0, 7.5), layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    panels = figure.subplots(1, 2)
+    shares = {name: _body_share(sweep, track) for name, track in sweep.modes.items()}
+    chosen = ([name for name in shares if shares[name] > 0.5], [name for name in shares if shares[name] <= 0.5])
+    scale = ScalarMappable(Normalize(sweep.shown[0].min(), sweep.shown[0].max()), "cividis")
+    for axes, names, title in zip(panels, chosen, ("body", "rotors and inflow"), strict=True):
+        for name in names:
+            _locus(axes, sweep, sweep.loci[name], scale)
+        axes.axvline(0.0, color="0.3", linewidth=0.8)
+        axes.set_title(title, fontsize=10)
+        axes.set_xlabel("real part [rad/s]")
+        axes.set_ylabel("imaginary part [rad/s]")
+        axes.grid(True, color="0.85", linewidth=0.6)
+        axes.margins(0.12, 0.12)
+    figure.colorbar(scale, ax=panels, label=_parameter_label(sweep), shrink=0.9, pad=0.01)
+    canvas.draw()  # settles the layout, which the places of the names depend on
+    for axes, names in zip(panels, chosen, strict=True):
+        _name_loci(axes, {name: sweep.loci[name] for name in names})
+    return figure
+
+
+def _body_share(sweep: Sweep, track: Sequence[Mode | None]) -> float:
+    """Median of the participation of the body's states in a mode."""
+    shares = []
+    for point, mode in zip(sweep.points, track, strict=True):
+        if mode is not None and point.model is not None:
+            body = [part_of(name).family == "body" for name in point.model.state_names]
+            shares.append(float(mode.participation[body].sum()))
+    return float(np.median(shares))
+
+
+def _locus(axes: Axes, sweep: Sweep, poles: NDArray[np.complex128], scale: ScalarMappable) -> None:
+    """Draw one locus: a line from value to value, and dots in the colours of the values."""
+    shown = sweep.shown[0]
+    order = np.argsort(shown, kind="stable")
+    axes.plot(poles.real[order], poles.imag[order], color="0.6", linewidth=0.8, zorder=1)
+    colours = scale.to_rgba(shown)
+    axes.scatter(poles.real, poles.imag, c=colours, s=14, linewidths=0.3, edgecolors="0.2", zorder=2)
+
+
+def _name_loci(axes: Axes, loci: dict[str, NDArray[np.complex128]]) -> None:
+    """Write every name beside the last pole of its locus, where it covers no other name and few poles."""
+    every = np.concatenate([*loci.values(), np.empty(0, complex)])
+    dots = _pixels(axes, every[~np.isnan(every)])
+    taken: list[Bbox] = []
+    for end, names in _together(axes, loci):
+        label = axes.annotate(
+            "\n".join(names),
+            (end.real, end.imag),
+            xytext=(0.0, 0.0),
+            textcoords="offset points",
+            fontsize=LABEL_SIZE,
+            linespacing=1.1,
+            va="center",
+            arrowprops={"arrowstyle": "-", "color": "0.5", "linewidth": 0.5, "shrinkA": 0.0, "shrinkB": 2.0},
+            zorder=3,
+        )
+        taken.append(_place(label, axes.bbox, dots, taken))
+
+
+def _pixels(axes: Axes, poles: NDArray[np.complex128]) -> Array:
+    return np.asarray(axes.transData.transform(np.column_stack([poles.real, poles.imag])))
+
+
+def _together(axes: Axes, loci: dict[str, NDArray[np.complex128]]) -> list[tuple[complex, list[str]]]:
+    """Last poles, the uppermost first, each with the names of all that end there as far as one can see."""
+    ends = {name: poles[~np.isnan(poles)][-1] for name, poles in loci.items()}
+    groups: list[tuple[complex, list[str]]] = []
+    for name in sorted(ends, key=lambda name: (-ends[name].imag, -ends[name].real)):
+        for end, names in groups:
+            if np.abs(np.diff(_pixels(axes, np.array([end, ends[name]])), axis=0)).max() < SAME_PLACE:
+                names.append(name)
+                break
+        else:
+            groups.append((ends[name], [name]))
+    return groups
+
+
+def _place(label: Annotation, frame: Bbox, dots: Array, taken: list[Bbox]) -> Bbox:
+    """Move a label to the best of the places to try; the box that it fills."""
+    figure = label.get_figure(root=True)
+    axes = label.axes
+    assert isinstance(axes, Axes)
+    assert figure is not None
+    dots_per_point = figure.dpi / 72.0
+    origin = _pixels(axes, np.array([complex(*label.xy)]))[0]
+    # as a text: the box of an annotation has its line in it
+    size = Text.get_window_extent(label, figure.canvas.get_renderer())  # type: ignore[attr-defined]
+    places = [(distance, math.radians(angle)) for distance in LABEL_DISTANCES for angle in LABEL_ANGLES]
+    costs = []
+    for distance, angle in places:
+        along, up = math.cos(angle), math.sin(angle)
+        x, y = origin + distance * dots_per_point * np.array([along, up])
+        x -= {"left": 0.0, "center": 0.5, "right": 1.0}[_side(along)] * size.width
+        box = Bbox.from_bounds(x, y - size.height / 2, size.width, size.height).padded(1.0)
+        costs.append((_cost(box, frame, dots, taken) + distance / 50.0, box))
+    best = min(range(len(costs)), key=lambda i: costs[i][0])
+    distance, angle = places[best]
+    label.set_position((distance * math.cos(angle), distance * math.sin(angle)))
+    label.set_horizontalalignment(_side(math.cos(angle)))
+    return costs[best][1]
+
+
+def _side(along: float) -> Literal["left", "center", "right"]:
+    """Side of a text that is next to its pole."""
+    return "left" if along > 0.1 else "right" if along < -0.1 else "center"
+
+
+def _cost(box: Bbox, frame: Bbox, dots: Array, taken: list[Bbox]) -> float:
+    """How bad a place is: names on names, outside of the frame, poles covered."""
+    inside = (dots[:, 0] > box.x0) & (dots[:, 0] < box.x1) & (dots[:, 1] > box.y0) & (dots[:, 1] < box.y1)
+    outside = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
+    return 20.0 * sum(box.overlaps(other) for other in taken) + 50.0 * outside + float(inside.sum())

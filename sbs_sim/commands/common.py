@@ -1,0 +1,181 @@
+"""What the commands do alike: arguments, tables, errors and interrupts.
+
+Nothing slow is imported here, so that `--help` and a wrong argument are answered at once.
+"""
+
+import argparse
+import json
+import math
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from sbs_sim.errors import SbsError
+
+if TYPE_CHECKING:
+    from sbs_sim.aircraft import Aircraft
+    from sbs_sim.analysis.trim import TrimPoint
+
+DEGREES = 180.0 / math.pi
+INTERRUPTED = 130
+
+
+class UsageError(Exception):
+    """A command line that argparse cannot know to be wrong."""
+
+
+def execute(
+    parser: argparse.ArgumentParser, work: Callable[[argparse.Namespace], None], arguments: Sequence[str] | None = None
+) -> int:
+    """Parse the command line and work; the exit code of the process.
+
+    Errors of this package are one line on stderr and the code 1; a wrong command line is argparse's and 2.
+    """
+    _end_quietly()
+    # intermixed: options may stand between the arguments
+    parsed = parser.parse_intermixed_args(arguments)
+    try:
+        work(parsed)
+        sys.stdout.flush()
+    except UsageError as error:
+        parser.error(str(error))
+    except SbsError as error:
+        sys.stdout.flush()
+        print(" ".join(str(error).split()), file=sys.stderr)
+        return 1
+    except OSError as error:  # of stdout: files have errors of their own
+        print(f"cannot write the output: {error.strerror}", file=sys.stderr)
+        os._exit(1)  # or Python would try once more at its end
+    return 0
+
+
+def _end_quietly() -> None:
+    """End at once, without a traceback, on Ctrl-C (while modules are being imported too) and where a pipe closes."""
+    signal.signal(signal.SIGINT, lambda *_: os._exit(INTERRUPTED))
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+
+
+# --- arguments --------------------------------------------------------------------------------------------------
+
+
+def add_flight_arguments(parser: argparse.ArgumentParser) -> None:
+    """Aircraft, flight condition and fidelity."""
+    group = parser.add_argument_group("aircraft")
+    group.add_argument("--aircraft", default="sbs", metavar="NAME", help="name or file (default: sbs)")
+    group.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        type=_assignment,
+        metavar="PATH=VALUE",
+        help="change a value of the aircraft file: body.mass=25, rotors.radius=0.5 (of every rotor),"
+        " rotors.MR1.hub[0]=0.01; may be given several times",
+    )
+    group = parser.add_argument_group("flight condition, relative to the air")
+    for name, unit, meaning in (
+        ("--airspeed", "m/s", "horizontal, negative is backwards"),
+        ("--climb-rate", "m/s", "positive up"),
+        ("--sideslip-deg", "deg", "from the heading to the track, positive to the right"),
+        ("--turn-rate-deg", "deg/s", "of the heading, positive to the right"),
+    ):
+        group.add_argument(name, type=float, default=0.0, metavar="X", help=f"{meaning} [{unit}]")
+    group = parser.add_argument_group("fidelity")
+    group.add_argument("--no-lead-lag", dest="lead_lag", action="store_false", help="hold the blades at zero lag")
+    group.add_argument(
+        "--no-cyclic-inflow", dest="cyclic_inflow", action="store_false", help="hold lambdas and lambdac at zero"
+    )
+    group.add_argument(
+        "--azimuth-count", type=int, default=12, metavar="N", help="azimuths of the averages (default: 12)"
+    )
+
+
+def _assignment(text: str) -> tuple[str, Any]:
+    path, equals, value = text.partition("=")
+    if not equals or not path:
+        raise argparse.ArgumentTypeError(f"{text!r}: allowed is PATH=VALUE, for example body.mass=25")
+    return path.strip(), _value(value.strip())
+
+
+def _value(text: str) -> Any:
+    """Number or list as JSON writes it, any other text as it is."""
+    for read in (json.loads, float):
+        try:
+            return read(text)
+        except (ValueError, RecursionError):
+            continue
+    return text
+
+
+def aircraft(arguments: argparse.Namespace) -> "Aircraft":
+    """The aircraft that the arguments tell."""
+    from sbs_sim.aircraft import Aircraft
+
+    chosen = Aircraft.load(arguments.aircraft)
+    for path, value in arguments.set:
+        chosen = chosen.with_value(path, value)
+    return chosen
+
+
+def flight(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Arguments for `sbs_sim.trim`: condition and fidelity, in SI units and radians."""
+    return {
+        "airspeed": arguments.airspeed,
+        "climb_rate": arguments.climb_rate,
+        "sideslip": math.radians(arguments.sideslip_deg),
+        "turn_rate": math.radians(arguments.turn_rate_deg),
+        "lead_lag": arguments.lead_lag,
+        "cyclic_inflow": arguments.cyclic_inflow,
+        "azimuth_count": arguments.azimuth_count,
+    }
+
+
+# --- printing ---------------------------------------------------------------------------------------------------
+
+
+def print_heading(what: str, craft: "Aircraft", point: "TrimPoint") -> None:
+    """Aircraft, condition and fidelity of a trim in two lines."""
+    condition = point.condition
+    print(
+        f"{what} of {craft.name}: airspeed {condition.airspeed:g} m/s, climb {condition.climb_rate:g} m/s,"
+        f" sideslip {condition.sideslip * DEGREES:g} deg, turn {condition.turn_rate * DEGREES:g} deg/s"
+    )
+    lag = "with lead-lag" if point.lead_lag else "without lead-lag"
+    inflow = "with cyclic inflow" if point.cyclic_inflow else "without cyclic inflow"
+    print(f"{lag}, {inflow}, {point.azimuth_count} azimuths; {solution(point)}")
+
+
+def solution(point: "TrimPoint") -> str:
+    """How a trim was found."""
+    if point.method == "two_loop":
+        how = f"two loops, {point.iterations} outer and {point.inner_iterations} inner iterations"
+    else:
+        how = f"Newton, {point.iterations} iterations"
+    return f"{how}, residual {point.residual:.1e}"
+
+
+def fixed(value: float, digits: int) -> str:
+    """Number with a fixed count of decimals, without a minus before zeros."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> None:
+    """Aligned columns.
+
+    Parameters
+    ----------
+    headings : sequence of str
+        One for each column.
+    rows : sequence of sequence of str
+    left : sequence of int
+        Columns that stand at the left, as texts do; numbers stand at the right.
+    """
+    table = [headings, *rows]
+    widths = [max(len(row[i]) for row in table) for i in range(len(headings))]
+    for row in table:
+        cells = [
+            cell.ljust(width) if i in left else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        print("  ".join(cells).rstrip())

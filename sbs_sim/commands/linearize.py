@@ -1,0 +1,186 @@
+"""`linearize`: linear model about a steady flight, its modes, and what they stand on."""
+
+import argparse
+import math
+from typing import TYPE_CHECKING
+
+from sbs_sim.commands.common import (
+    add_flight_arguments,
+    aircraft,
+    execute,
+    fixed,
+    flight,
+    print_heading,
+    print_table,
+)
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sbs_sim.aircraft import Aircraft
+    from sbs_sim.analysis.floquet import Floquet
+    from sbs_sim.analysis.linearize import LinearModel
+    from sbs_sim.analysis.modes import Mode
+
+LEADING = 3  # states named beside a mode
+LEAST_SHARE = 0.005  # of the participations that are listed
+COLUMNS = 10  # of a matrix side by side
+
+
+def main() -> int:
+    """Executable `linearize`."""
+    return execute(_parser(), _work)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="linearize", description="Linearize an aircraft and print its modes.")
+    add_flight_arguments(parser)
+    group = parser.add_argument_group("linear model")
+    group.add_argument(
+        "--method",
+        choices=("averaged", "paper"),
+        default="averaged",
+        help="differences of the averaged model (default), or term by term as the paper does",
+    )
+    group.add_argument(
+        "--quasi-static", action="store_true", help="the eight body states only, with rotors and inflow settled"
+    )
+    group = parser.add_argument_group("output")
+    for name, meaning in (
+        ("--matrices", "print A and B"),
+        ("--derivatives", "print stability and control derivatives, rotors and inflow settled"),
+        ("--participation", "print what takes part in each mode"),
+        ("--floquet", "print the characteristic exponents of the periodic model beside the averaged poles"),
+    ):
+        group.add_argument(name, action="store_true", help=meaning)
+    group.add_argument("--export", metavar="FILE", help="write the model to a .npz, .mat or .json file")
+    group.add_argument("--json", metavar="FILE", help="write the model to this file as JSON, in SI units and radians")
+    return parser
+
+
+def _work(arguments: argparse.Namespace) -> None:
+    from sbs_sim.analysis.export import to_json, write
+    from sbs_sim.analysis.linearize import linearize
+
+    craft = aircraft(arguments)
+    full = linearize(craft, **flight(arguments), method=arguments.method)
+    model = full.quasi_static() if arguments.quasi_static else full
+    _print_model(craft, model)
+    if arguments.participation:
+        _print_participation(model)
+    if arguments.floquet:
+        from sbs_sim.analysis.floquet import floquet
+
+        _print_floquet(full, floquet(craft, full.trim))
+    if arguments.derivatives:
+        _print_derivatives(full)
+    if arguments.matrices:
+        _print_matrix("A", model.a, model.state_names, model.state_names)
+        _print_matrix("B", model.b, model.state_names, model.control_names)
+    if arguments.export:
+        model.save(arguments.export)
+    if arguments.json:
+        write(arguments.json, to_json(model.to_dict()))
+
+
+def _print_model(craft: "Aircraft", model: "LinearModel") -> None:
+    """Modes, azimuth spread, hash."""
+    print_heading("linear model", craft, model.trim)
+    states = len(model.state_names)
+    settled = ", rotors and inflow settled" if states == 8 else ""
+    print(f"method {model.method}, {states} states{settled}, {len(model.control_names)} controls")
+    print()
+    rows = [
+        [
+            mode.name,
+            *pole_cells(mode.pole),
+            fixed(mode.frequency, 4),
+            fixed(mode.damping, 4),
+            _seconds(mode.time_to_half),
+            _seconds(mode.time_to_double),
+            ", ".join(f"{name} {share:.0%}" for name, share in _leading(model, mode)[:LEADING]),
+        ]
+        for mode in model.modes
+    ]
+    headings = ["mode", "real [rad/s]", "imaginary", "frequency", "damping", "half [s]", "double [s]", "leading states"]
+    print_table(headings, rows, left=(0, 7))
+    print()
+    print(f"azimuth spread {model.azimuth_spread:.3g}")
+    print(f"parameters {model.parameter_hash}")
+    for text in model.trim.beyond_limits:
+        print(f"beyond its limits: {text}")
+
+
+def pole_cells(pole: complex) -> list[str]:
+    """Real part, and imaginary part of a pair."""
+    return [fixed(pole.real, 5), f"± {fixed(abs(pole.imag), 5)}" if pole.imag else ""]
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.4f}" if math.isfinite(time) else ""
+
+
+def _leading(model: "LinearModel", mode: "Mode") -> list[tuple[str, float]]:
+    """States by their share in a mode, the largest first."""
+    shares = zip(model.state_names, map(float, mode.participation), strict=True)
+    return sorted(shares, key=lambda item: -item[1])
+
+
+def _print_participation(model: "LinearModel") -> None:
+    print(f"\nparticipation of the states, from {LEAST_SHARE:.1%}")
+    width = max(len(mode.name) for mode in model.modes)
+    for mode in model.modes:
+        shares = [f"{name} {share:.1%}" for name, share in _leading(model, mode) if share >= LEAST_SHARE]
+        print(f"{mode.name.ljust(width)}  {', '.join(shares)}")
+
+
+def _print_floquet(model: "LinearModel", found: "Floquet") -> None:
+    """One row for each real pole or pair."""
+    print(f"\nFloquet: period {found.period * 1e3:.4g} ms, exponents beside the poles of the averaged model [rad/s]")
+    rows = []
+    for pole, exponent, multiplier in zip(found.poles, found.exponents, found.multipliers, strict=True):
+        if pole.imag < 0.0:
+            continue
+        gap = abs(exponent - pole)
+        name = min(model.modes, key=lambda mode: abs(mode.pole - pole)).name
+        rows.append(
+            [
+                name,
+                *pole_cells(pole),
+                *pole_cells(exponent),
+                f"{gap:.2e}",
+                f"{gap / abs(pole) if pole else 0.0:.2e}",
+                f"{abs(multiplier):.6f}",
+            ]
+        )
+    print_table(["mode", "averaged", "pole", "exponent", "", "difference", "relative", "|multiplier|"], rows)
+
+
+def _print_derivatives(model: "LinearModel") -> None:
+    """One row for each force and moment; over mass and inertia, so accelerations."""
+    from sbs_sim.analysis.linearize import FORCES, MOMENTS, MOTIONS
+
+    values = model.derivatives()
+    symbols = (*FORCES.values(), *MOMENTS.values())
+    print("\nderivatives over mass and inertia, rotors and inflow settled [m/s^2 and rad/s^2 by m/s, rad/s, rad]")
+    rows = [
+        [f"by {name}", *(f"{values[f'{symbol}_{name}']:.5g}" for symbol in symbols)]
+        for name in (*MOTIONS, *model.control_names)
+    ]
+    print_table(["", *symbols], rows)
+
+
+def _print_matrix(
+    name: str, matrix: "NDArray[np.float64]", row_names: tuple[str, ...], column_names: tuple[str, ...]
+) -> None:
+    """Matrix with the names of rows and columns, some columns at a time."""
+    for first in range(0, len(column_names), COLUMNS):
+        chosen = slice(first, first + COLUMNS)
+        print()
+        headings = [f"{name} [SI, rad]", *column_names[chosen]]
+        rows = [
+            [row_name, *(f"{value:.6g}" for value in row[chosen])]
+            for row_name, row in zip(row_names, matrix, strict=True)
+        ]
+        print_table(headings, rows)

@@ -1,0 +1,159 @@
+"""`sweep`: trims and modes along one parameter, as a table, plots and files."""
+
+import argparse
+import math
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from sbs_sim.commands.common import (
+    DEGREES,
+    UsageError,
+    add_flight_arguments,
+    aircraft,
+    execute,
+    fixed,
+    flight,
+    print_table,
+)
+from sbs_sim.errors import SweepError
+
+if TYPE_CHECKING:
+    from sbs_sim.analysis.sweep import Progress, Sweep, SweepPoint
+
+# As they are typed, and the names of `sbs_sim.analysis.sweep`; all other parameters are paths.
+TYPED = {
+    "airspeed": "airspeed",
+    "climb_rate": "climb_rate",
+    "sideslip_deg": "sideslip",
+    "turn_rate_deg": "turn_rate",
+}
+MOST_POINTS = 100_000
+
+
+def main() -> int:
+    """Executable `sweep`."""
+    return execute(_parser(), _work)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="sweep",
+        usage="sweep PARAMETER (START STOP COUNT | --values X [X ...]) [options]",
+        description="Trim and linearize an aircraft along one parameter, on all cores.",
+    )
+    parser.add_argument(
+        "parameter",
+        metavar="PARAMETER",
+        help=f"{', '.join(TYPED)}, or the path of a value of the aircraft file: body.mass, rotors.blade_mass (of every"
+        " rotor), rotors[0].radius",
+    )
+    parser.add_argument("range", nargs="*", type=float, metavar="START STOP COUNT", help="evenly spaced, ends included")
+    parser.add_argument("--values", nargs="+", type=float, metavar="X", help="instead of a range")
+    add_flight_arguments(parser)
+    group = parser.add_argument_group("work and output")
+    group.add_argument("--trims-only", dest="linear", action="store_false", help="no linear models")
+    group.add_argument("--workers", type=int, metavar="N", help="threads (default: one for each core)")
+    group.add_argument("--out", metavar="DIR", help="write plots as PNG and SVG into this folder")
+    group.add_argument("--csv", metavar="FILE", help="write a table of trims and poles, in SI units and radians")
+    group.add_argument("--json", metavar="FILE", help="write all trims and models, in SI units and radians")
+    return parser
+
+
+def _work(arguments: argparse.Namespace) -> None:
+    typed = arguments.parameter.replace("-", "_")
+    parameter = TYPED.get(typed, arguments.parameter)
+    if f"{typed}_deg" in TYPED:
+        raise UsageError(f"parameter {typed}: angles are typed in degrees, as {typed}_deg")
+    values = _values(arguments)
+    if typed.endswith("_deg") and typed in TYPED:
+        values = [math.radians(value) for value in values]
+    from sbs_sim.analysis.export import sweep_to_csv, to_json, write
+    from sbs_sim.analysis.sweep import sweep
+
+    craft = aircraft(arguments)
+    with _progress_bar(len(values)) as progress:
+        found = sweep(
+            craft,
+            parameter,
+            values,
+            **flight(arguments),
+            linear=arguments.linear,
+            workers=arguments.workers,
+            progress=progress,
+        )
+    _print_sweep(found)
+    if arguments.csv:
+        write(arguments.csv, sweep_to_csv(found))
+    if arguments.json:
+        write(arguments.json, to_json(found.to_dict()))
+    if arguments.out:
+        from sbs_sim.analysis.sweep_plots import save_plots
+
+        for path in save_plots(found, arguments.out):
+            print(f"written: {path}")
+    if len(found.failed) == len(found.points):
+        raise SweepError("no point of the sweep has a trim")
+
+
+def _values(arguments: argparse.Namespace) -> list[float]:
+    if arguments.values is not None:
+        if arguments.range:
+            raise UsageError("allowed are START STOP COUNT or --values, not both")
+        return list(arguments.values)
+    if len(arguments.range) != 3:
+        raise UsageError("needed are START STOP COUNT, or --values")
+    start, stop, count = arguments.range
+    if not (1 <= count <= MOST_POINTS and count == int(count)):
+        raise UsageError(f"COUNT = {count:g}: allowed are whole numbers from 1 to {MOST_POINTS}")
+    steps = max(int(count) - 1, 1)
+    return [start + (stop - start) * i / steps for i in range(int(count))]
+
+
+@contextmanager
+def _progress_bar(total: int) -> Iterator["Progress | None"]:
+    """A bar on stderr where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=total, unit=" points", file=sys.stderr, leave=False) as bar:
+
+        def progress(_point: "SweepPoint", _done: int, _total: int) -> None:
+            bar.update()
+
+        yield progress
+
+
+def _print_sweep(found: "Sweep") -> None:
+    """One row for each point, and below the errors."""
+    shown, unit = found.shown
+    names = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")
+    angles = [found[name] * DEGREES for name in ("pitch", "roll", *names)]
+    power = found["power"].sum(axis=1)
+    rows = []
+    for i, point in enumerate(found.points):
+        row = [f"{shown[i]:.6g}"]
+        if point.trim is None:
+            row += ["-"] * (len(angles) + 1) + ["no trim, see below"]
+        else:
+            row += [fixed(angle[i], 3) for angle in angles]
+            row += [fixed(power[i], 1), _growing(point)]
+        rows.append(row)
+    labels = ("pitch", "roll", "collective", "lateral", "longitudinal", "differential")
+    headings = [f"{found.parameter} [{unit}]" if unit else found.parameter, *(f"{label} [deg]" for label in labels)]
+    print_table([*headings, "power [W]", "growing modes"], rows, left=(8,))
+    for value, point in zip(shown, found.points, strict=True):
+        if point.error is not None:
+            print(f"{found.parameter} {value:g}: {point.error}")
+        elif point.trim is not None and point.trim.beyond_limits:
+            print(f"{found.parameter} {value:g}: beyond its limits: {'; '.join(point.trim.beyond_limits)}")
+
+
+def _growing(point: "SweepPoint") -> str:
+    """Modes that grow."""
+    if point.model is None:
+        return ""
+    return "; ".join(mode.name for mode in point.model.modes if mode.pole.real > 0.0)

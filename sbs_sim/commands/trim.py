@@ -1,0 +1,90 @@
+"""`trim`: attitude, controls and loads of a steady flight."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+from sbs_sim.commands.common import (
+    DEGREES,
+    add_flight_arguments,
+    aircraft,
+    execute,
+    fixed,
+    flight,
+    print_heading,
+    print_table,
+)
+
+if TYPE_CHECKING:
+    from sbs_sim.aircraft import Aircraft
+    from sbs_sim.analysis.trim import TrimPoint
+
+
+def main() -> int:
+    """Executable `trim`."""
+    return execute(_parser(), _work)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="trim", description="Trim an aircraft and print the steady flight.")
+    add_flight_arguments(parser)
+    parser.add_argument(
+        "--method",
+        choices=("newton", "two_loop"),
+        default="newton",
+        help="newton (default), or the nested loops of the paper",
+    )
+    parser.add_argument("--json", metavar="FILE", help="also write the trim to this file, in SI units and radians")
+    return parser
+
+
+def _work(arguments: argparse.Namespace) -> None:
+    from sbs_sim.analysis.export import to_json, write
+    from sbs_sim.analysis.trim import trim
+
+    craft = aircraft(arguments)
+    point = trim(craft, **flight(arguments), method=arguments.method)
+    print_trim(craft, point)
+    if arguments.json:
+        write(arguments.json, to_json(point.to_dict()))
+
+
+def print_trim(craft: "Aircraft", point: "TrimPoint") -> None:
+    """Print a trim."""
+    from sbs_sim.model.state import CONTROL_NAMES
+
+    print_heading("trim", craft, point)
+    print()
+    rows = [["pitch [deg]", fixed(point.pitch * DEGREES, 4), ""], ["roll [deg]", fixed(point.roll * DEGREES, 4), ""]]
+    for name, value in zip(CONTROL_NAMES, point.controls, strict=True):
+        low, high = (limit * DEGREES for limit in craft.control_ranges[name])
+        rows.append([f"{name} [deg]", fixed(value * DEGREES, 4), f"{low:g} to {high:g}"])
+    print_table(["body and controls", "", "range"], rows)
+    print()
+    print_table(["rotors", *(rotor.name for rotor in craft.rotors)], _rotor_rows(craft, point))
+    print()
+    print(f"power of all rotors {point.power.sum():.2f} W")
+    for text in point.beyond_limits:
+        print(f"beyond its limits: {text}")
+
+
+def _rotor_rows(craft: "Aircraft", point: "TrimPoint") -> list[list[str]]:
+    """Loads, swashplate, flap, lag and inflow; one column for each rotor."""
+    from sbs_sim.model.state import SWASHPLATE_NAMES, part_of
+
+    rows = [
+        ["thrust [N]", *(fixed(value, 3) for value in point.thrust)],
+        ["torque [N m]", *(fixed(value, 4) for value in point.torque)],
+        ["power [W]", *(fixed(value, 2) for value in point.power)],
+    ]
+    for name, angles in zip(SWASHPLATE_NAMES, point.swashplate.T, strict=True):
+        rows.append([f"{name} [deg]", *(fixed(angle * DEGREES, 4) for angle in angles)])
+    families: dict[str, dict[str, list[str]]] = {"flap": {}, "lag": {}, "inflow": {}}
+    for name, value in zip(point.state_names, point.state, strict=True):
+        part = part_of(name)
+        if part.family in families and not part.is_rate:
+            is_angle = part.family != "inflow"
+            label = f"{part.family} {name.partition('(')[0]} {'[deg]' if is_angle else '[1]'}"
+            # rotors may have unequal numbers of blades, and so of coordinates
+            row = families[part.family].setdefault(label, [""] * len(craft.rotors))
+            row[part.rotor] = fixed(value * DEGREES, 4) if is_angle else fixed(value, 6)
+    return rows + [[label, *cells] for family in families.values() for label, cells in family.items()]

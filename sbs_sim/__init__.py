@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
     from sbs_sim.analysis.linearize import LinearModel, linearize
+    from sbs_sim.analysis.sweep import Sweep, sweep
     from sbs_sim.analysis.trim import TrimPoint, trim
     from sbs_sim.simulation import Simulation, simulate
 
@@ -21,12 +22,14 @@ _HOME = {
     "Aircraft": "sbs_sim.aircraft",
     "LinearModel": "sbs_sim.analysis.linearize",
     "linearize": "sbs_sim.analysis.linearize",
+    "Sweep": "sbs_sim.analysis.sweep",
+    "sweep": "sbs_sim.analysis.sweep",
     "TrimPoint": "sbs_sim.analysis.trim",
     "trim": "sbs_sim.analysis.trim",
     "Simulation": "sbs_sim.simulation",
     "simulate": "sbs_sim.simulation",
 }
-__all__ = ["Aircraft", "LinearModel", "Simulation", "TrimPoint", "linearize", "simulate", "trim"]
+__all__ = ["Aircraft", "LinearModel", "Simulation", "Sweep", "TrimPoint", "linearize", "simulate", "sweep", "trim"]
 
 
 def __getattr__(name: str) -> Any:

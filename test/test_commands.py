@@ -156,6 +156,17 @@ def test_linearize_prints_what_else_it_is_asked_for(sbs):
     assert multiplier == pytest.approx(math.exp(exponent * 8.3333e-3), abs=2e-6)
 
 
+def test_exponents_of_rotors_with_unequal_speeds():
+    """Their common period is long: the fast modes need many instants of it, and some are gone at its end."""
+    file = Path(__file__).resolve().parent / "data" / "tail_rotor.yaml"
+    text = output("linearize", "--aircraft", file, "--no-lead-lag", "--floquet")
+    table = text[text.index("Floquet: period 100 ms") :]
+    for name in ("Dutch roll", "short period", "regressing flap, rotor 2", "coning, rotor 1"):
+        relative = row(table, f"{name} ")[5]
+        assert relative < 1e-5
+    assert re.search(r"^uniform inflow, rotor 2 +-532\.\d+ +gone ", table, re.MULTILINE)
+
+
 def test_linearize_with_settled_rotors(sbs):
     text = output("linearize", "--quasi-static", "--no-lead-lag")
     model = linearize(sbs, lead_lag=False).quasi_static()

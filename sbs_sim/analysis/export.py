@@ -88,7 +88,10 @@ def plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
+        numbers = value.tolist()
+        # the long way for each number is slow where there are thousands
+        is_plain = value.dtype.kind in "biu" or (value.dtype.kind == "f" and bool(np.isfinite(value).all()))
+        return numbers if is_plain else plain(numbers)
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     if isinstance(value, complex):

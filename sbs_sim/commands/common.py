@@ -4,6 +4,7 @@ Nothing slow is imported here, so that `--help` and a wrong argument are answere
 """
 
 import argparse
+import io
 import json
 import math
 import os
@@ -33,7 +34,7 @@ def execute(
 
     Errors of this package are one line on stderr and the code 1; a wrong command line is argparse's and 2.
     """
-    _end_quietly()
+    _behave_on_a_terminal()
     # intermixed: options may stand between the arguments
     parsed = parser.parse_intermixed_args(arguments)
     try:
@@ -51,10 +52,12 @@ def execute(
     return 0
 
 
-def _end_quietly() -> None:
-    """End at once, without a traceback, on Ctrl-C (while modules are being imported too) and where a pipe closes."""
+def _behave_on_a_terminal() -> None:
+    """No tracebacks for Ctrl-C (also while modules are imported), closed pipes, and characters that cannot be shown."""
     signal.signal(signal.SIGINT, lambda *_: os._exit(INTERRUPTED))
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal may not know every character
 
 
 # --- arguments --------------------------------------------------------------------------------------------------

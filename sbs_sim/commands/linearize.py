@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 LEADING = 3  # states named beside a mode
 LEAST_SHARE = 0.005  # of the participations that are listed
+LEAST_INSTANTS = 48  # of a period for the characteristic exponents
+LARGEST_STEP = 0.25  # rad of the fastest mode
+ROUNDING = 1e-13  # of a multiplier: what decays further in a period leaves no exponent
 COLUMNS = 10  # of a matrix side by side
 
 
@@ -72,7 +75,7 @@ def _work(arguments: argparse.Namespace) -> None:
     if arguments.floquet:
         from sbs_sim.analysis.floquet import floquet
 
-        _print_floquet(full, floquet(craft, full.trim))
+        _print_floquet(full, floquet(craft, full.trim, _azimuth_count(craft, full)))
     if arguments.derivatives:
         _print_derivatives(full)
     if arguments.matrices:
@@ -99,7 +102,7 @@ def _print_model(craft: "Aircraft", model: "LinearModel") -> None:
             fixed(mode.damping, 4),
             _seconds(mode.time_to_half),
             _seconds(mode.time_to_double),
-            ", ".join(f"{name} {share:.0%}" for name, share in _leading(model, mode)[:LEADING]),
+            ", ".join(f"{name} {share:.0%}" for name, share in _shares(model, mode)[:LEADING]),
         ]
         for mode in model.modes
     ]
@@ -121,18 +124,26 @@ def _seconds(time: float) -> str:
     return f"{time:.4f}" if math.isfinite(time) else ""
 
 
-def _leading(model: "LinearModel", mode: "Mode") -> list[tuple[str, float]]:
-    """States by their share in a mode, the largest first."""
+def _shares(model: "LinearModel", mode: "Mode") -> list[tuple[str, float]]:
+    """States and their shares in a mode, the largest first, without those of next to nothing."""
     shares = zip(model.state_names, map(float, mode.participation), strict=True)
-    return sorted(shares, key=lambda item: -item[1])
+    return sorted(((name, share) for name, share in shares if share >= LEAST_SHARE), key=lambda item: -item[1])
 
 
 def _print_participation(model: "LinearModel") -> None:
     print(f"\nparticipation of the states, from {LEAST_SHARE:.1%}")
     width = max(len(mode.name) for mode in model.modes)
     for mode in model.modes:
-        shares = [f"{name} {share:.1%}" for name, share in _leading(model, mode) if share >= LEAST_SHARE]
-        print(f"{mode.name.ljust(width)}  {', '.join(shares)}")
+        print(f"{mode.name.ljust(width)}  {', '.join(f'{name} {share:.1%}' for name, share in _shares(model, mode))}")
+
+
+def _azimuth_count(craft: "Aircraft", model: "LinearModel") -> int:
+    """Instants of a period that the fastest mode needs: rotors of unequal speeds may have a long common period."""
+    from sbs_sim.analysis.floquet import AZIMUTH_COUNTS, common_period
+
+    period, _ = common_period(craft)
+    steps = math.ceil(period * abs(model.poles[-1]) / LARGEST_STEP)
+    return min(max(LEAST_INSTANTS, 2 * steps), AZIMUTH_COUNTS[1])  # two instants make a step
 
 
 def _print_floquet(model: "LinearModel", found: "Floquet") -> None:
@@ -142,18 +153,14 @@ def _print_floquet(model: "LinearModel", found: "Floquet") -> None:
     for pole, exponent, multiplier in zip(found.poles, found.exponents, found.multipliers, strict=True):
         if pole.imag < 0.0:
             continue
-        gap = abs(exponent - pole)
         name = min(model.modes, key=lambda mode: abs(mode.pole - pole)).name
-        rows.append(
-            [
-                name,
-                *pole_cells(pole),
-                *pole_cells(exponent),
-                f"{gap:.2e}",
-                f"{gap / abs(pole) if pole else 0.0:.2e}",
-                f"{abs(multiplier):.6f}",
-            ]
-        )
+        cells = [name, *pole_cells(pole)]
+        if abs(multiplier) > ROUNDING:
+            gap = abs(exponent - pole)
+            cells += [*pole_cells(exponent), f"{gap:.2e}", f"{gap / abs(pole) if pole else 0.0:.2e}"]
+        else:
+            cells += ["gone", "", "", ""]
+        rows.append([*cells, f"{abs(multiplier):.6g}"])
     print_table(["mode", "averaged", "pole", "exponent", "", "difference", "relative", "|multiplier|"], rows)
 
 

@@ -24,8 +24,8 @@ def main() -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="reproduce",
-        description="Compute the paper's Tables 1 to 5, its inflow poles and its hover, and print them beside the printed"
-        " values, with their ratios; remarks say why something differs.",
+        description="Compute the paper's Tables 1 to 5, its inflow poles and its trims, and print them beside the"
+        " printed values, with their ratios; remarks say why something differs.",
     )
     parser.add_argument("--aircraft", default="sbs", metavar="NAME", help="the complete model (default: sbs)")
     parser.add_argument(
@@ -44,28 +44,32 @@ def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.analysis.reproduce import reproduce
 
     craft, paper_craft = Aircraft.load(arguments.aircraft), Aircraft.load(arguments.paper_aircraft)
-    with _progress_bar() as progress:
+    if arguments.out:  # a bad path is told before the work, not after it
+        from sbs_sim.analysis.page import make_folder
+
+        make_folder(arguments.out)
+    with _progress_bar("model") as progress:
         report = reproduce(craft, paper_craft, progress=progress)
-    sys.stdout.reconfigure(errors="replace")  # type: ignore[union-attr]  # a terminal without ± prints the rest
-    _print_report(report)
     if arguments.json:
         write(arguments.json, to_json(report.to_dict()))
+    _print_report(report)
     if arguments.out:
         from sbs_sim.analysis.page import save_page
 
-        written = save_page(report, arguments.out)
-        print(f"written: {len(written)} files, {written[-1]}")
+        with _progress_bar("figure") as progress:
+            written = save_page(report, arguments.out, progress=progress)
+        print(f"written: {written[-1]} and {len(written) - 1} figures")
 
 
 @contextmanager
-def _progress_bar() -> Iterator[Callable[[int, int], None] | None]:
+def _progress_bar(unit: str) -> Iterator[Callable[[int, int], None] | None]:
     """A bar on stderr where that is a terminal."""
     if not sys.stderr.isatty():
         yield None
         return
     from tqdm import tqdm
 
-    with tqdm(unit="model", file=sys.stderr, leave=False) as bar:
+    with tqdm(unit=unit, file=sys.stderr, leave=False) as bar:
 
         def progress(done: int, total: int) -> None:
             bar.total = total
@@ -75,28 +79,57 @@ def _progress_bar() -> Iterator[Callable[[int, int], None] | None]:
 
 
 def _print_report(report: "Report") -> None:
-    from sbs_sim.analysis.reproduce_format import SOURCES, fact_tables, forward_rows
+    """Tables, trim curves, facts, remarks, circumstances."""
+    from sbs_sim.analysis.reproduce_format import SOURCES, fact_tables, forward_table
 
     for name, table in report.tables.items():
         _print_comparison(name, table)
-    trims = report.to_dict()["trim_forward"]
-    print(f"Trim over forward speed [deg]; in print: {trims['paper'].partition(',')[0]} ...")
-    labels = [f"{name} {SOURCES[source]}" for source in report.flights for name in ("pitch", "collective", "longitudinal")]
-    for label in labels:
-        assert label
-    _print_forward(report)
-    for heading, headings, rows in fact_tables(report.facts):
-        print(heading)
-        print_table(headings, rows, left=(0, 1) if headings[1] == "" else tuple(range(len(headings))))
+    for heading, headings, rows in (forward_table(report, SHOWN_SPEEDS), *fact_tables(report)):
+        _print_wrapped("", heading)
+        print_table(headings, rows, left=[i for i in range(len(headings)) if not _is_number(rows[-1][i])])
         print()
     print("Remarks")
     for remark in report.remarks:
         _print_wrapped("- ", remark)
     print()
     print(", ".join(f"{name} {version}" for name, version in report.versions.items()))
-    for name, value in report.parameter_hashes.items():
-        print(f"{SOURCES[name]}: {report.conditions['aircraft'][name]['name']}, parameters {value[:12]}")
-    assert forward_rows
+    for name, own in report.conditions["aircraft"].items():
+        print(f"{SOURCES[name]}: {own['name']}, parameters {report.parameter_hashes[name][:12]}")
+
+
+def _print_comparison(name: str, table: "Comparison") -> None:
+    """One table: print, ours and ratios; the same things computed otherwise; the remarks."""
+    from sbs_sim.analysis import reproduce_format as f
+
+    numbers, others = f.notes(table), f.other_names(table)
+    main, further, last = [], [], ""
+    for group, label, entry in f.rows(table):
+        if group != last:
+            main.append([table.group_labels[group]] + [""] * 6)
+            further.append([table.group_labels[group]] + [""] * len(others))
+            last = group
+        note = f"[{numbers[entry.remark]}]" if entry.remark and not label.startswith(" ") else ""
+        ratios = [f.ratio_text(entry, ours) for ours in (entry.complete, entry.paper_reading)]
+        values = [f.value_text(value) for value in (entry.complete, entry.paper_reading)]
+        main.append([label, entry.printed.text or "-", values[0], ratios[0], values[1], ratios[1], note])
+        if any(other in entry.others for other in others):
+            further.append([label, *(f.value_text(entry.others.get(other)) for other in others)])
+    print(f.title(name, table))
+    print_table(["", *f.HEADINGS, ""], main, left=(0, 1, 2, 4, 6))
+    print()
+    print_table(["computed otherwise", *(f.OTHERS[other] for other in others)], further, left=range(1 + len(others)))
+    print()
+    for remark, number in numbers.items():
+        _print_wrapped(f"[{number}] ", remark)
+    print()
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.rstrip("*"))
+    except ValueError:
+        return False
+    return True
 
 
 def _print_wrapped(mark: str, text: str) -> None:

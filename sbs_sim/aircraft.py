@@ -66,7 +66,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Options:
-    """How the model reads the equations: see MODEL.md sections 5 and 9."""
+    """How the model reads the equations: see theory.md sections 5 and 9."""
 
     coupling: str
     hub_moment: str
@@ -134,7 +134,7 @@ class Rotor:
         return self.blade_mass * self.blade_length**2 / 3
 
     def elements(self, count: int) -> Array:
-        """Blade elements at their mid-points (MODEL.md section 4).
+        """Blade elements at their mid-points (theory.md section 4).
 
         Parameters
         ----------
@@ -309,7 +309,7 @@ class Aircraft:
     def fuselage(self) -> tuple[float, Array, Array]:
         """Mass [kg], first moment [kg m] and inertia [kg m^2] about the c.g. of the aircraft without blades.
 
-        The printed totals minus the blades, undeflected and averaged over azimuth (MODEL.md section 5); the c.g. of
+        The printed totals minus the blades, undeflected and averaged over azimuth (theory.md section 5); the c.g. of
         the whole stays at the origin, so the fuselage has the first moment that balances the blades.
         """
         mass = self.body.mass
@@ -323,7 +323,7 @@ class Aircraft:
         return mass, first, inertia
 
     def params(self, lead_lag: bool = True, cyclic_inflow: bool = True) -> P.Params:
-        """Arrays of the compiled model with the given fidelity (MODEL.md section 7).
+        """Arrays of the compiled model with the given fidelity (theory.md section 7).
 
         Parameters
         ----------

@@ -1,6 +1,6 @@
 """The control mixer: four pilot controls to the swashplates of all rotors, with ranges and rates.
 
-Swashplate angles are `Rotor.mixing` times the pilot controls (paper section 2.1.1; MODEL.md section 4). Pilot controls
+Swashplate angles are `Rotor.mixing` times the pilot controls (paper section 2.1.1; theory.md section 4). Pilot controls
 are clipped to their ranges, swashplate angles to theirs, and each angle moves no faster than its actuator.
 """
 

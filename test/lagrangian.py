@@ -1,4 +1,4 @@
-"""Flap and lag accelerations of one blade from Lagrange's equations: a check on MODEL.md section 3.
+"""Flap and lag accelerations of one blade from Lagrange's equations: a check on theory.md section 3.
 
 Only the position of the blade's points enters, r(t, beta, xi) + s e(t, beta, xi), on a hub whose motion is
 prescribed. Kinetic energy, its derivatives and the generalized forces follow by symbolic differentiation; no

@@ -1,4 +1,4 @@
-"""Plain reference of the complete model (MODEL.md, sections 1 to 7): the yardstick of the fast kernel.
+"""Plain reference of the complete model (theory.md, sections 1 to 7): the yardstick of the fast kernel.
 
 Everything is written for clarity and shares no line with the package. Vectors stand in body axes (FRD) with
 cross products, a blade is three point masses, and loops run over rotors, blades, masses and elements. The
@@ -23,12 +23,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-#: Smooth floor of the inflow's total velocity V_T, in units of the tip speed (MODEL.md section 6).
+#: Smooth floor of the inflow's total velocity V_T, in units of the tip speed (theory.md section 6).
 INFLOW_SPEED_FLOOR = 1e-5
 
 
 # ------------------------------------------------------------------------------------------------------------
-# Frames and the multiblade transform (MODEL.md section 1)
+# Frames and the multiblade transform (theory.md section 1)
 # ------------------------------------------------------------------------------------------------------------
 
 
@@ -96,7 +96,7 @@ def multiblade_matrix(blades, psi, derivative=0):
     """Return the matrix from multiblade coordinates to blade angles, or its derivative by psi.
 
     beta_k = a0 - sum_n (a_n cos n psi_k + b_n sin n psi_k) + a_d (-1)^(k-1), coordinates in the order
-    a0, a1, b1, a2, b2, ..., and a_d last where N_b is even (MODEL.md section 1).
+    a0, a1, b1, a2, b2, ..., and a_d last where N_b is even (theory.md section 1).
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def split_state(ac, x, lead_lag=True, cyclic_inflow=True):
 
 
 # ------------------------------------------------------------------------------------------------------------
-# Mass (MODEL.md sections 2 and 5)
+# Mass (theory.md sections 2 and 5)
 # ------------------------------------------------------------------------------------------------------------
 
 
@@ -212,7 +212,7 @@ def body_mass(ac):
 
 
 # ------------------------------------------------------------------------------------------------------------
-# Blade kinematics (MODEL.md section 2)
+# Blade kinematics (theory.md section 2)
 # ------------------------------------------------------------------------------------------------------------
 
 
@@ -345,7 +345,7 @@ def make_blades(ac, state, psi):
 
 
 # ------------------------------------------------------------------------------------------------------------
-# Air loads (MODEL.md sections 4 and 5)
+# Air loads (theory.md sections 4 and 5)
 # ------------------------------------------------------------------------------------------------------------
 
 
@@ -427,7 +427,7 @@ def flat_plate_force(ac, air_velocity):
 
 
 # ------------------------------------------------------------------------------------------------------------
-# Inflow (MODEL.md section 6)
+# Inflow (theory.md section 6)
 # ------------------------------------------------------------------------------------------------------------
 
 
@@ -499,7 +499,7 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
 
 
 # ------------------------------------------------------------------------------------------------------------
-# The coupled system (MODEL.md sections 3 and 5)
+# The coupled system (theory.md sections 3 and 5)
 # ------------------------------------------------------------------------------------------------------------
 
 

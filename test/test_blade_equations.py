@@ -1,4 +1,4 @@
-"""Blade accelerations of the plain reference against Lagrange's equations (MODEL.md section 3)."""
+"""Blade accelerations of the plain reference against Lagrange's equations (theory.md section 3)."""
 
 import numpy as np
 import plain_model

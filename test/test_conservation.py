@@ -1,4 +1,4 @@
-"""What must not change while the aircraft flies: momentum, energy, symmetry (MODEL.md sections 1, 3 and 5)."""
+"""What must not change while the aircraft flies: momentum, energy, symmetry (theory.md sections 1, 3 and 5)."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The compiled derivative against the plain reference, and against closed forms (MODEL.md sections 2 to 7)."""
+"""The compiled derivative against the plain reference, and against closed forms (theory.md sections 2 to 7)."""
 
 from itertools import pairwise
 
@@ -549,7 +549,7 @@ def test_momentum_theory_in_axial_flight(climb, cyclic_inflow):
 
 @pytest.mark.parametrize("expansion", [0.5, 0.7, 1.0])
 def test_momentum_theory_with_a_duct(expansion):
-    """T_rotor + T_duct = 2 a_w T_rotor = rho A v^2 / a_w (Leishman; MODEL.md section 5)."""
+    """T_rotor + T_duct = 2 a_w T_rotor = rho A v^2 / a_w (Leishman; theory.md section 5)."""
     model = Model(stand(environment={"gravity": 0.0}, duct_expansion=expansion))
     rotor, swash = model.aircraft.rotors[0], [[0.15, 0.0, 0.0]]
     x = model.settle(model.state(lambda0=0.05), swash)

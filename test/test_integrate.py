@@ -49,7 +49,7 @@ def test_five_degrees_are_enough_for_the_real_airfoil(sbs, hover):
 
 
 def test_partitioned_scheme_is_of_first_order(smooth_model, hover):
-    """The paper's Figure 3, forcing of the previous step (MODEL.md section 7): half the step, half the change."""
+    """The paper's Figure 3, forcing of the previous step (theory.md section 7): half the step, half the change."""
     change = changes(flights(smooth_model, hover, (8, 16, 32, 64), PARTITIONED))
     np.testing.assert_allclose(change[:-1] / change[1:], 2.0, atol=0.15)
 

@@ -164,7 +164,7 @@ def test_short_period_of_forward_flight_is_a_pair():
 
 
 def test_rotor_modes_have_the_frequencies_of_their_names(sbs, models):
-    """At nu - 1, nu, nu + 1 per revolution: flap 1.237, lag 0.490 (MODEL.md section 3), and damping by the air."""
+    """At nu - 1, nu, nu + 1 per revolution: flap 1.237, lag 0.490 (theory.md section 3), and damping by the air."""
     omega = sbs.rotors[0].speed
     model = models["hover"]
     for kind in ("symmetric", "antisymmetric"):
@@ -213,7 +213,7 @@ def test_heavily_damped_flap_keeps_its_name():
     omega, damping = 1.0, 4.0
     a = np.zeros((6, 6))
     a[0, 1], a[1, 0], a[1, 1] = 1.0, -1.0, -damping
-    # rotating b'' = -b - damping b' seen in fixed axes: MODEL.md section 1
+    # rotating b'' = -b - damping b' seen in fixed axes: theory.md section 1
     a[2, 4] = a[3, 5] = 1.0
     a[4] = [0, 0, omega**2 - 1.0, -damping * omega, -damping, -2 * omega]
     a[5] = [0, 0, damping * omega, omega**2 - 1.0, 2 * omega, -damping]

@@ -1,4 +1,4 @@
-"""The plain reference against closed forms, conservation laws and symmetries (MODEL.md sections 1 to 7)."""
+"""The plain reference against closed forms, conservation laws and symmetries (theory.md sections 1 to 7)."""
 
 from types import SimpleNamespace
 

@@ -366,7 +366,7 @@ def test_accelerations_are_those_of_the_centre_of_gravity(sbs, hover):
 
 
 def test_blade_angles_are_those_of_the_multiblade_coordinates(sbs, hover):
-    """beta_k = a0 - a1 cos psi_k - b1 sin psi_k (MODEL.md section 1)."""
+    """beta_k = a0 - a1 cos psi_k - b1 sin psi_k (theory.md section 1)."""
     state = trimmed_state(sbs, hover)
     state[sbs.layout.flap(1)] = 0.03, 0.02, -0.01
     state[sbs.layout.lag(1)] = 0.01, -0.02, 0.004

@@ -12,7 +12,7 @@ PAGE = ROOT / "docs" / "theory.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 MARKS = ("<!-- reproduction: begin -->", "<!-- reproduction: end -->")
 WRITTEN = TEXT.split(MARKS[0])[0] + TEXT.split(MARKS[1])[-1]  # without the generated tables
-PAGES = ("MODEL", "theory")  # names under which docstrings cite the page
+PAGES = ("theory",)  # names under which docstrings cite the page
 CITING = ("sbs_sim", "msg_defs", "config", "test", "tools")
 SUFFIXES = {".py", ".msg", ".srv", ".action", ".yaml", ".json", ".csv", ".md", ".txt", ".xml"}
 LAST_EQUATION = 34  # of the paper
@@ -139,7 +139,7 @@ def cited_sections():
 
 
 def test_sections_are_found_in_all_their_forms():
-    text = "MODEL.md section 3; theory.md sections 2 to 5. MODEL.md, sections 1,\n# 3 and 9.2, (MODEL.md 8 and 9)"
+    text = "theory.md section 3; theory.md sections 2 to 5. theory.md, sections 1,\n# 3 and 9.2, (theory.md 8 and 9)"
     assert CITATION.findall(text) == ["3", "2 to 5", "1,\n# 3 and 9.2", "8 and 9"]
 
 

@@ -1,4 +1,4 @@
-"""Trim: equilibrium, momentum theory, signs, what the paper prints, and honest failure (MODEL.md 8 and 9)."""
+"""Trim: equilibrium, momentum theory, signs, what the paper prints, and honest failure (theory.md 8 and 9)."""
 
 import math
 

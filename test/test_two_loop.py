@@ -1,4 +1,4 @@
-"""The paper's two nested trim loops, and the balance of steady flight that they solve (MODEL.md section 8)."""
+"""The paper's two nested trim loops, and the balance of steady flight that they solve (theory.md section 8)."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Generate config/airfoils/linear_573.csv, the plain airfoil of the paper's reading (MODEL.md section 9).
+"""Generate config/airfoils/linear_573.csv, the plain airfoil of the paper's reading (theory.md section 9).
 
     python tools/make_linear_573.py [output.csv]
 

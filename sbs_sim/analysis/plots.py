@@ -59,7 +59,7 @@ CURVES: dict[str, tuple[str, Literal["-", "--", "-."], str, float]] = {
     "paper_reading": (ORANGE, "--", "s", 4.0),
     "paper_reading_uniform_inflow": (GREEN, "-.", "^", 2.8),
 }
-POLES = {"paper": ("none", 10.0), "complete": (BLUE, 6.8), "paper_reading": (ORANGE, 3.8)}  # fill, size of markers
+POLES = {"paper": ("none", 11.0), "complete": (BLUE, 8.0), "paper_reading": (ORANGE, 4.8)}  # fill, size of markers
 HATCHES = {"complete": "", "paper_reading": "////"}
 MARKERS = {
     "short_period": ("o", "short period"),
@@ -300,32 +300,52 @@ def _draw_inflow(axes: Axes, report: Report) -> None:
 
 # --- participation: Figures 8 to 13 and 16 to 22 ----------------------------------------------------------------
 
-BODY_FIGURES = {  # number: table, mode
-    8: ("table1", "short_period"),
-    9: ("table1", "phugoid"),
-    10: ("table1", "heave"),
-    11: ("table1", "roll"),
-    12: ("table1", "dutch_roll"),
-    13: ("table1", "spiral"),
-    16: ("table4", "short_period"),
-    17: ("table4", "dutch_roll"),
-    18: ("table4", "phugoid"),
-    19: ("table4", "roll"),
+BODY_FIGURES = {  # number: table, mode, states that take part in it by the paper's text
+    8: ("table1", "short_period", ("q", "theta", "u")),
+    9: ("table1", "phugoid", ("u", "theta")),
+    10: ("table1", "heave", ("w",)),
+    11: ("table1", "roll", ("p", "phi", "v")),
+    12: ("table1", "dutch_roll", ("v", "phi", "r")),
+    13: ("table1", "spiral", ("r", "v")),
+    16: ("table4", "short_period", ("lambdac",)),
+    17: ("table4", "dutch_roll", ("lambdas", "lambdac")),
+    18: ("table4", "phugoid", ("lambdac",)),
+    19: ("table4", "roll", ("lambdas", "lambdac")),
 }
-ROTOR_FIGURES = {
-    20: ("coupled", ("coupled_collective", "coupled_advancing", "coupled_regressing")),
-    21: ("flap", ("collective_flap", "non_uniform_disc_tilt")),
-    22: ("lead-lag", ("collective_lag", "non_uniform_lag")),
+ROTOR_FIGURES = {  # number: what, modes, what the paper's text says
+    20: (
+        "coupled",
+        ("coupled_collective", "coupled_advancing", "coupled_regressing"),
+        "In print a_0 and ξ_0 in the collective mode (here their rates), in the others disc tilts, lag coordinates and"
+        " the rates of both.",
+    ),
+    21: ("flap", ("collective_flap", "non_uniform_disc_tilt"), "In print a_0 alone at the origin, disc tilt at Ω."),
+    22: ("lead-lag", ("collective_lag", "non_uniform_lag"), "In print ξ_0 alone at the origin, cyclic lag at Ω."),
 }
 
 
 def _body_drawings(report: Report) -> list[Drawing]:
     found = []
-    for number, (table, key) in BODY_FIGURES.items():
+    for number, (table, key, states) in BODY_FIGURES.items():
         inflow = "uniform inflow" if table == "table1" else "lead-lag and non-uniform inflow"
-        caption = f"Participation in the mode “{MARKERS[key][1]}” in hover with {inflow} (full matrices)."
+        caption = (
+            f"Participation in the mode “{MARKERS[key][1]}” in hover with {inflow} (full matrices). Taking part"
+            f" in print, with the shares here (complete model / paper's reading): {_shares_text(report, table, key, states)}."
+        )
         found.append(Drawing(number, caption, False, partial(_body_figure, report, table, key)))
     return found
+
+
+def _shares_text(report: Report, table: str, key: str, states: Sequence[str]) -> str:
+    """States that the paper names, with their shares in both models."""
+    shares = []
+    for name in ("complete", "paper_reading"):
+        model = report.models[name][table]
+        mode = _find(model.modes, key)
+        shares.append({} if mode is None else _by_quantity(mode, model.state_names))
+    labels = {state: STATES.get(state, SYMBOLS.get(state, state)) for state in states}
+    said = [f"{label} ({' / '.join(f'{own.get(label, 0.0):.2f}' for own in shares)})" for label in labels.values()]
+    return ", ".join(said).replace("$", "")
 
 
 def _body_figure(report: Report, table: str, key: str) -> Figure:
@@ -396,11 +416,11 @@ def _rotor_drawings(report: Report) -> list[Drawing]:
         Drawing(
             number,
             f"Participation in the {what} modes of one rotor, first matrix of eq. [32] (Table 5); magnitudes of the"
-            " poles: complete model / paper's reading.",
+            f" poles: complete model / paper's reading. {said}",
             True,
             partial(_rotor_figure, report, keys),
         )
-        for number, (what, keys) in ROTOR_FIGURES.items()
+        for number, (what, keys, said) in ROTOR_FIGURES.items()
     ]
 
 

@@ -1,4 +1,4 @@
-"""Trim: the steady flight in which the averaged derivative vanishes (MODEL.md section 8).
+"""Trim: the steady flight in which the averaged derivative vanishes (theory.md section 8).
 
 Newton's method solves all equations together, from hover or along a path of conditions from hover. The paper's two
 nested loops are there to compare with.

@@ -1,4 +1,4 @@
-"""The equations of trim, and what a trimmed flight is (MODEL.md section 8).
+"""The equations of trim, and what a trimmed flight is (theory.md section 8).
 
 Unknowns are pitch and roll, the four controls, and of every rotor flap, lag and inflow; equations are the averages of
 the six body accelerations, of the flap and lag accelerations and of the inflow rates.

@@ -1,4 +1,4 @@
-"""Trim by the paper's two nested loops (paper section 2.2, steps (a) to (h); MODEL.md section 8).
+"""Trim by the paper's two nested loops (paper section 2.2, steps (a) to (h); theory.md section 8).
 
 The outer loop settles the blades at every azimuth configuration and averages their multiblade coordinates; the inner
 loop balances the body with the blades held on those and lets the inflow follow. In hover and vertical flight that

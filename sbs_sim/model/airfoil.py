@@ -1,4 +1,4 @@
-"""Section lift and drag over Reynolds number and angle of attack (MODEL.md section 4).
+"""Section lift and drag over Reynolds number and angle of attack (theory.md section 4).
 
 A table holds cl and cd on a full grid of Reynolds numbers and angles from -180 to 180 deg. Compiled code
 reads it as an array of cells, one 64-byte row per cell with the coefficients of the bilinear interpolation,
@@ -76,7 +76,7 @@ def viterna(
 
     References
     ----------
-    MODEL.md section 4. L. A. Viterna, R. D. Corrigan: Fixed pitch rotor performance of large horizontal axis
+    theory.md section 4. L. A. Viterna, R. D. Corrigan: Fixed pitch rotor performance of large horizontal axis
     wind turbines, NASA CP-2230, 1982. Reflection as in AirfoilPrep (National Renewable Energy Laboratory).
     """
     magnitude = np.abs(np.asarray(alpha, dtype=np.float64))

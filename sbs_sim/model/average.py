@@ -1,4 +1,4 @@
-"""Averages of the derivative over the azimuth (MODEL.md section 8; paper eq. [15])."""
+"""Averages of the derivative over the azimuth (theory.md section 8; paper eq. [15])."""
 
 import math
 

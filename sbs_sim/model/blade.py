@@ -1,4 +1,4 @@
-"""One blade: kinematics, section loads and the terms of its flap and lag equations (MODEL.md sections 2 to 5).
+"""One blade: kinematics, section loads and the terms of its flap and lag equations (theory.md sections 2 to 5).
 
 A blade is worked out in its own basis (y, t, u): y along the line from lag to flap hinge, t along the motion, u up
 along the shaft. For a counter-clockwise rotor this basis is right-handed; for a clockwise one it is left-handed,
@@ -19,7 +19,7 @@ SPEED_ROW, REYNOLDS_ROW, ALPHA_ROW, RE_ROW, LIFT_ROW, DRAG_ROW = (CHUNK * row fo
 
 @kernel
 def section_loads(p, j, strip, ut0, ut1, up0, up1, pitch):
-    """Sums of the aerodynamic forces along one blade of rotor j (MODEL.md section 4).
+    """Sums of the aerodynamic forces along one blade of rotor j (theory.md section 4).
 
     The velocities relative to the air are linear in the distance s from the flap hinge: u_T = ut0 + ut1 s along the
     motion, u_P = up0 + up1 s along the blade's normal n [m/s]. pitch: angle of the blade root [rad].
@@ -175,7 +175,7 @@ def blade_terms(
         pitch,
     )
 
-    # accelerations without those of hub, beta'', xi'': a(s) = f + s g (MODEL.md section 2)
+    # accelerations without those of hub, beta'', xi'': a(s) = f + s g (theory.md section 2)
     we = o1 * cx + o2 * sx
     wh_squared = o1 * o1 + o2 * o2 + wh3 * wh3
     f1 = e_l * (o1 * we - cx * wh_squared) - e_f * (o2 * o2 + wl3 * wl3)
@@ -191,7 +191,7 @@ def blade_terms(
     g2 = alpha3 * cb - alpha1 * sb + w2 * wd
     g3 = -alpha2 * cb + wl3 * wd - sb * wb_squared
 
-    # hinge moments (MODEL.md section 3), the hub's known acceleration added to that of the hinge
+    # hinge moments (theory.md section 3), the hub's known acceleration added to that of the hinge
     k1 = e_f * m_b + cb * s1
     k2 = e_f * s1 + cb * a1
     ff_n = cb * (f3 + h3) - sb * (f1 + h1)

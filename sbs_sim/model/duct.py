@@ -1,4 +1,4 @@
-"""Thrust of the duct around a rotor (MODEL.md section 5; Leishman, Principles of Helicopter Aerodynamics, ch. 6)."""
+"""Thrust of the duct around a rotor (theory.md section 5; Leishman, Principles of Helicopter Aerodynamics, ch. 6)."""
 
 from sbs_sim.model.kernel import kernel
 

@@ -1,4 +1,4 @@
-"""The derivative of the complete state (MODEL.md sections 2 to 7).
+"""The derivative of the complete state (theory.md sections 2 to 7).
 
 Body and blades are one multibody system (`complete` coupling). Its mass matrix has the shape of an arrow: every
 blade's two hinge equations hold that blade's beta'', xi'' and the six accelerations of the body, nothing else. The
@@ -57,7 +57,7 @@ def derivative(p, x, swash, psi, wind, work, dx):
 
 @entry
 def steady_balance(p, x, swash, psi, wind, work, dx, imbalance):
-    """What the model gives while the body does not accelerate: for the two loops of trim (MODEL.md section 8).
+    """What the model gives while the body does not accelerate: for the two loops of trim (theory.md section 8).
 
     The blades are taken twice. As they move on a hub in steady motion (U' = om' = 0), they give the rates of the
     rotors. Held on constant multiblade coordinates, with the steady accelerations
@@ -412,7 +412,7 @@ def _subtract_carried_blades(t, b, out):
 
 @kernel
 def _paper_hub_moment(p, j, work):
-    """Replace the moment across the shaft by the paper's reading (MODEL.md section 9)."""
+    """Replace the moment across the shaft by the paper's reading (theory.md section 9)."""
     out = work.loads[j]
     a = p.axes[j]
     axial = a[0, 2] * out[P.MOMENT] + a[1, 2] * out[P.MOMENT + 1] + a[2, 2] * out[P.MOMENT + 2]
@@ -464,7 +464,7 @@ def _solve_body_alone(p, work):
 
 @kernel
 def _body_rates(x, rot, om, g, acceleration, dx):
-    """Rates of position, attitude, velocity and angular velocity (MODEL.md section 5)."""
+    """Rates of position, attitude, velocity and angular velocity (theory.md section 5)."""
     u, v, w = x[7], x[8], x[9]
     dx[0] = rot[0] * u + rot[1] * v + rot[2] * w
     dx[1] = rot[3] * u + rot[4] * v + rot[5] * w

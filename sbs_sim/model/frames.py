@@ -1,4 +1,4 @@
-"""Frames and attitude: earth NED, body FRD, hub axes (MODEL.md section 1).
+"""Frames and attitude: earth NED, body FRD, hub axes (theory.md section 1).
 
 Euler angles are yaw, pitch, roll (psi, theta, phi), applied in that order. A quaternion is (w, x, y, z) and
 takes body components to earth components; R_NB is the same as a matrix.

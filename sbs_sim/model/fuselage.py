@@ -1,4 +1,4 @@
-"""Drag of the fuselage as three flat plates (MODEL.md section 5)."""
+"""Drag of the fuselage as three flat plates (theory.md section 5)."""
 
 from sbs_sim.model.kernel import kernel
 

@@ -1,4 +1,4 @@
-"""Dynamic inflow of Peters and HaQuang with three states per rotor (MODEL.md section 6).
+"""Dynamic inflow of Peters and HaQuang with three states per rotor (theory.md section 6).
 
 v_i = Omega R [lambda0 + r/R (lambdac cos psi + lambdas sin psi)], positive downwards through the disc.
 D. A. Peters, N. HaQuang: Dynamic inflow for practical applications, J. AHS 33 (4), 1988.
@@ -69,7 +69,7 @@ def _rates(lambda0, lambdas, lambdac, flow, flow_cyclic, xc, xs, duct, speed, th
 
 @kernel
 def _solve_gain(l11, xc, xs, b0, bc, bs):
-    """Solve Lt y = b in the order (0, c, s), Lt of MODEL.md section 6, by Cramer's rule."""
+    """Solve Lt y = b in the order (0, c, s), Lt of theory.md section 6, by Cramer's rule."""
     ring = 2.0 * (1.0 + xc * xc + xs * xs)
     a11, a12, a13 = l11, -SKEW * xc, -SKEW * xs
     a21, a22, a23 = SKEW * xc, ring - 4.0 * xc * xc, -4.0 * xc * xs

@@ -1,4 +1,4 @@
-"""Fixed steps in time: classical Runge-Kutta, and the paper's partitioned scheme (MODEL.md section 7)."""
+"""Fixed steps in time: classical Runge-Kutta, and the paper's partitioned scheme (theory.md section 7)."""
 
 import math
 

@@ -9,7 +9,7 @@ simulation state, 13 + 4 n_blades + 3 n_rotors values
 linear state, 8 + 4 n_blades + 3 n_rotors values (38 for two three-bladed rotors; eq. [18] of the paper)
     u w q theta v p phi r | flap | flap rates | lag | lag rates | inflow
 
-Flap and lag are multiblade coordinates (MODEL.md section 1), inflow is lambda0, lambdas, lambdac per rotor.
+Flap and lag are multiblade coordinates (theory.md section 1), inflow is lambda0, lambdas, lambdac per rotor.
 """
 
 import re

@@ -298,6 +298,7 @@ def inline_svg(svg: str, name: str, label: str) -> str:
         What those hear who do not see it; escaped.
     """
     svg = svg[svg.index("<svg") :]
+    svg = re.sub(r' (width|height)="[\d.]+pt"', "", svg, count=2)  # those of the page and of the view box count
     # a style element would act on the whole page; STYLE has what it says
     svg = re.sub(r"\s*<metadata>.*?</metadata>|\s*<style .*?</style>", "", svg, flags=re.DOTALL)
     svg = re.sub(r'\bid="', f'id="{name}-', svg)

@@ -328,9 +328,10 @@ def _body_drawings(report: Report) -> list[Drawing]:
     found = []
     for number, (table, key, states) in BODY_FIGURES.items():
         inflow = "uniform inflow" if table == "table1" else "lead-lag and non-uniform inflow"
+        shares = _shares_text(report, table, key, states)
         caption = (
-            f"Participation in the mode “{MARKERS[key][1]}” in hover with {inflow} (full matrices). Taking part"
-            f" in print, with the shares here (complete model / paper's reading): {_shares_text(report, table, key, states)}."
+            f"Participation in the mode “{MARKERS[key][1]}” in hover with {inflow} (full matrices). Taking part in"
+            f" print, with the shares here (complete model / paper's reading): {shares}."
         )
         found.append(Drawing(number, caption, False, partial(_body_figure, report, table, key)))
     return found

@@ -15,7 +15,7 @@ from sbs_sim.errors import LinearizationError
 def test_hover_has_the_poles_of_the_averaged_model(sbs, lead_lag, cyclic_inflow):
     point = trim(sbs, lead_lag=lead_lag, cyclic_inflow=cyclic_inflow)
     found = floquet(sbs, point)
-    assert found.difference.max() < 1e-4  # of the integration; the averages are exact here
+    assert found.difference.max() < 1e-9  # the model does not change with the azimuth
 
 
 def test_forward_flight_has_them_nearly(sbs):
@@ -52,7 +52,7 @@ def test_differential_coordinates_change_sign_with_every_blade():
     aircraft = build(every_rotor={"blades": 4, "blade_mass": 0.12, "chord": {"root": 0.038, "tip": 0.038}})
     found = floquet(aircraft, trim(aircraft), azimuth_count=96)
     assert found.period == pytest.approx(math.pi / aircraft.rotors[0].speed)
-    assert found.difference.max() < 1e-4
+    assert found.difference.max() < 1e-9
 
 
 def test_period_is_common_to_all_rotors():

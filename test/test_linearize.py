@@ -384,6 +384,15 @@ def test_bad_requests_are_named(sbs, arguments, error, text):
         linearize(sbs, **arguments)
 
 
+def test_a_trim_of_another_aircraft_is_refused(sbs, hover):
+    with pytest.raises(LinearizationError, match="it is one of another"):
+        linearize(build(body={"mass": 30.0}), point=hover)
+
+
+def test_one_azimuth_says_nothing_of_the_spread(sbs):
+    assert math.isnan(linearize(sbs, azimuth_count=1).azimuth_spread)
+
+
 def test_what_is_not_there_is_named(hover_model):
     with pytest.raises(KeyError, match="no mode 'flutter': there are spiral"):
         hover_model.mode("flutter")

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
+from scipy.optimize import linear_sum_assignment
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.linearize import difference_steps, jacobians, used_states
@@ -24,7 +26,7 @@ MOST_PASSAGES = 60  # of any rotor in one common period
 AZIMUTH_COUNTS = (8, 1000)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Floquet:
     """Characteristic exponents beside the poles of the averaged model.
 
@@ -63,8 +65,7 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
     point : TrimPoint
         The mean state about which is linearized.
     azimuth_count : int
-        Number of instants of one period at which the model is linearized, even, 8 to 1000; two make a step of the
-        classical Runge-Kutta method.
+        Number of instants of one period at which the model is linearized, even, 8 to 1000; two make a step.
 
     Returns
     -------
@@ -114,23 +115,22 @@ def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
 
 
 def _transition(a: Array, period: float) -> Array:
-    """Transition matrix over a period with the instants of a; x' = A(t) x by the classical Runge-Kutta method."""
+    """Transition matrix over a period of x' = A(t) x with the instants of a.
+
+    Magnus' series to the fourth order with Simpson's rule, exact for a constant A (S. Blanes, F. Casas, J. A. Oteo,
+    J. Ros, The Magnus expansion and some of its applications, Physics Reports 470, 2009, section 5.3).
+    """
     n = a.shape[1]
     x, h = np.eye(n), 2.0 * period / len(a)
     for i in range(0, len(a), 2):
         first, middle, last = a[i], a[i + 1], a[(i + 2) % len(a)]
-        k1 = first @ x
-        k2 = middle @ (x + 0.5 * h * k1)
-        k3 = middle @ (x + 0.5 * h * k2)
-        k4 = last @ (x + h * k3)
-        x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        mean = h / 6.0 * (first + 4.0 * middle + last)
+        x = expm(mean - h * h / 12.0 * (first @ last - last @ first)) @ x
     return x
 
 
 def _beside(poles: ComplexArray, multipliers: ComplexArray, period: float) -> tuple[ComplexArray, ComplexArray]:
     """Multipliers and exponents in the order of the poles; a logarithm has many branches, the nearest is taken."""
-    from scipy.optimize import linear_sum_assignment
-
     principal = np.log(multipliers) / period
     turn = 2.0 * math.pi / period
     branch = np.round((poles[:, None].imag - principal.imag) / turn)

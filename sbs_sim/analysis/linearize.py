@@ -42,7 +42,7 @@ LOADS |= {P.FORCE + i: (f"hub_force_{axis}", "N") for i, axis in enumerate("xyz"
 LOADS |= {P.MOMENT + i: (f"hub_moment_{axis}", "N m") for i, axis in enumerate("xyz")}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinearModel:
     """x' = A x + B u, y = C x + D u for small departures from a trimmed flight.
 
@@ -66,7 +66,7 @@ class LinearModel:
         "averaged" or "paper".
     azimuth_spread : float
         Largest departure of A at one azimuth from their mean, Frobenius norms of the matrices in steps, relative: near
-        0 a time-invariant model is exact.
+        0 a time-invariant model is exact. Not a number where there is one azimuth only.
     spread : ndarray, shape (n, n + m)
         Half the range over the azimuth of each element of A and B.
     parameter_hash : str
@@ -246,7 +246,7 @@ def linearize(
     TrimError
         See `sbs_sim.trim`.
     LinearizationError
-        A value out of range.
+        A value out of range, or a trim of another aircraft.
     """
     if method not in METHODS:
         raise LinearizationError(f"method = {method!r}: allowed are {', '.join(METHODS)}")
@@ -263,6 +263,8 @@ def linearize(
             cyclic_inflow=cyclic_inflow,
             azimuth_count=azimuth_count,
         )
+    elif point.parameter_hash != aircraft.parameter_hash:
+        raise LinearizationError("point: allowed is a trim of this aircraft, it is one of another")
     model = _averaged(aircraft, point, step_scale)
     if method == "averaged":
         return model
@@ -369,6 +371,8 @@ def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> Linear
 
 def _relative_spread(each: Array, steps: Array) -> float:
     """See `LinearModel.azimuth_spread`; every state is measured in its step."""
+    if len(each) == 1:
+        return math.nan
     scaled = each * steps / steps[:, None]
     mean = scaled.mean(axis=0)
     return float(np.linalg.norm(scaled - mean, axis=(1, 2)).max() / np.linalg.norm(mean))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from sbs_sim.model.state import Part, part_of
 
@@ -22,10 +23,11 @@ ComplexArray = NDArray[np.complex128]
 LONGITUDINAL, LATERAL = ("u", "w", "q", "theta"), ("v", "p", "phi", "r")
 ALIKE = 1e-9  # poles that differ by less of the largest one are one multiple pole
 OWNED = 0.7  # share of one rotor in a mode of several beyond which it is that rotor's
+ROLLING = 0.15  # least share of p in a roll mode
 COUPLED = 0.2  # share of flap, and of lag, from which a mode of the first matrix of eq. [32] is a coupled one
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mode:
     """One real pole, or one conjugate pair.
 
@@ -216,8 +218,6 @@ def _assign(found: Sequence[Mode], groups: dict[str, list[int]]) -> list[str]:
 
 def _match(found: Sequence[Mode], slots: Sequence[str], shares: dict[str, list[float]]) -> list[list[str]]:
     """Slots of each mode, two of a pair, that maximise the sum of the shares; the larger share first."""
-    from scipy.optimize import linear_sum_assignment
-
     owners = [i for i, mode in enumerate(found) for _ in range(1 + mode.is_oscillatory)]
     gain = np.array([[shares[slot][i] for slot in slots] for i in owners]).reshape(len(owners), len(slots))
     result: list[list[str]] = [[] for _ in found]
@@ -234,7 +234,7 @@ def _share(mode: Mode, state_names: Sequence[str], wanted: Iterable[str]) -> flo
 
 
 def _name_longitudinal(inside: list[Mode], state_names: Sequence[str]) -> list[Mode]:
-    """Heave subsidence where w has a pole of its own, short period with q, phugoid with u and theta."""
+    """Heave subsidence (or divergence) where w has a pole of its own, short period with q, phugoid with u, theta."""
     owners = {"heave subsidence": ("w",), "short period": ("q",), "phugoid": ("u", "theta")}
     slots = [name for name, states in owners.items() for state in states if state in state_names]
     shares = {name: [_share(mode, state_names, states) for mode in inside] for name, states in owners.items()}
@@ -243,7 +243,8 @@ def _name_longitudinal(inside: list[Mode], state_names: Sequence[str]) -> list[M
         name = taken[0] if taken else "longitudinal"
         if len(set(taken)) > 1:  # a pair of w and q is the short period of forward flight
             name = "short period" if "short period" in taken else "phugoid"
-        named.append(replace(mode, name=name))
+        growing = name == "heave subsidence" and mode.pole.real > 0.0
+        named.append(replace(mode, name="heave divergence" if growing else name))
     return named
 
 
@@ -255,8 +256,8 @@ def _name_lateral(inside: list[Mode], state_names: Sequence[str]) -> list[Mode]:
     real = [i for i in range(len(inside)) if i not in pairs]
     names = dict.fromkeys(range(len(inside)), "Dutch roll")
     names.update(dict.fromkeys(pairs[1:], "roll-spiral"))
-    if real:
-        rolling = max(real, key=lambda i: roll[i])
+    rolling = max(real, key=lambda i: roll[i], default=None)
+    if rolling is not None and roll[rolling] >= ROLLING:
         names[rolling] = "roll"
         real.remove(rolling)
     if real:
@@ -273,18 +274,15 @@ def _name_rotor(inside: list[Mode], parts: Sequence[Part], state_names: Sequence
     family, harmonic = parts[states[0]].family, parts[states[0]].harmonic
     rotors = sorted({parts[i].rotor for i in states})
     states = sorted(states, key=lambda i: state_names[i])  # so that the rotors' coordinates stand in one order
-    by_owner: dict[str, list[Mode]] = defaultdict(list)
-    for mode in inside:
-        by_owner[_owner(mode, parts, states, rotors)].append(mode)
+    name = _family_name(family, harmonic)
+    base = [replace(mode, name=name) for mode in inside]
+    if family != "inflow" and harmonic > 0:  # all rotors together: half of all poles are slow, whoever has them
+        base = _rank(base, name, (f"regressing {name}", f"advancing {name}"))
     named = []
-    for owner, own in by_owner.items():
-        base = [replace(mode, name=_family_name(family, harmonic)) for mode in own]
-        if family != "inflow" and harmonic > 0:
-            name = base[0].name
-            base = _rank(base, name, (f"regressing {name}", f"advancing {name}"))
-        for mode in base:
-            suffix = owner if owner != "together" else _symmetry(mode, parts, states, rotors)
-            named.append(replace(mode, name=f"{mode.name}{suffix}"))
+    for mode in base:
+        owner = _owner(mode, parts, states, rotors)
+        suffix = owner if owner != "together" else _symmetry(mode, parts, states, rotors)
+        named.append(replace(mode, name=f"{mode.name}{suffix}"))
     return named
 
 

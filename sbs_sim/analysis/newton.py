@@ -34,7 +34,7 @@ class Solution:
     converged: bool
 
 
-def newton(equations: Equations, start: Array) -> Solution:
+def newton(equations: Equations, start: Array, jacobian: Equations | None = None) -> Solution:
     """Solve equations(values) = 0 with halved steps where a full one does not lessen the residual.
 
     Parameters
@@ -42,14 +42,17 @@ def newton(equations: Equations, start: Array) -> Solution:
     equations : callable
         Residuals, shape (n,), of the unknowns, shape (n,).
     start : ndarray, shape (n,)
+    jacobian : callable, optional
+        Derivative of the residuals by the unknowns, shape (n, n), of these; by central differences if not given.
     """
+    slope = jacobian or (lambda values: _jacobian(equations, values))
     values, residual = start, equations(start)
     for iteration in range(MOST_ITERATIONS):
         size = float(np.abs(residual).max())
         if size < TOLERANCE:
             return Solution(values, residual, iteration, True)
         try:
-            step = np.asarray(np.linalg.solve(_jacobian(equations, values), residual), dtype=np.float64)
+            step = np.asarray(np.linalg.solve(slope(values), residual), dtype=np.float64)
         except np.linalg.LinAlgError:
             break
         better = _descend(equations, values, step, residual)

@@ -145,7 +145,11 @@ def _walk(problem: TrimProblem, condition: TrimCondition, hover: Array) -> tuple
 
 def _newton(problem: TrimProblem, condition: TrimCondition, start: Array) -> tuple[Array, int]:
     """Solve one condition from a guess; TrimError if that fails."""
-    solution = newton(lambda unknowns: problem.residual(condition, unknowns), start)
+    solution = newton(
+        lambda unknowns: problem.residual(condition, unknowns),
+        start,
+        lambda unknowns: problem.jacobian(condition, unknowns),
+    )
     if solution.converged:
         return solution.values, solution.iterations
     size, worst = float(np.abs(solution.residual).max()), problem.worst_equation(solution.residual)

@@ -18,11 +18,14 @@ from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.average import averaged_derivative
 from sbs_sim.model.frames import euler_to_quaternion, hub_axes, rotation_matrix
+from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
 
 Array = NDArray[np.float64]
 
 ATTITUDE_UNKNOWNS, CONTROL_UNKNOWNS = 2, 4
 BODY_UNKNOWNS = ATTITUDE_UNKNOWNS + CONTROL_UNKNOWNS
+BODY_STEP, ROTOR_STEP = 1e-5, 1e-6  # of the differences: m/s, rad/s, rad; rad, inflow ratio
+MOTION = [S.LINEAR_U, S.LINEAR_V, S.LINEAR_W, S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ class TrimCondition:
         return to_body @ heading_axes, to_body @ np.array([0.0, 0.0, self.turn_rate])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TrimPoint:
     """A trimmed flight.
 
@@ -105,6 +108,8 @@ class TrimPoint:
         Iterations of the inner loop in all; 0 with Newton's method.
     beyond_limits : tuple of str
         Controls and swashplate angles that the trim needs beyond their range; empty if it can be flown.
+    parameter_hash : str
+        Of the aircraft, see `Aircraft.parameter_hash`.
     """
 
     condition: TrimCondition
@@ -125,6 +130,7 @@ class TrimPoint:
     iterations: int
     inner_iterations: int
     beyond_limits: tuple[str, ...]
+    parameter_hash: str
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain lists and numbers for JSON, by the names of the attributes, with "control_names"."""
@@ -160,6 +166,8 @@ class TrimProblem:
         self._places, equations = self._rotor_unknowns()
         self.equations = np.concatenate([np.arange(S.VELOCITY, S.BODY_SIZE), equations])
         self.scales = self._equation_scales()
+        linear = self.equations - S.BODY_SIZE + S.LINEAR_BODY_SIZE
+        self._linear_equations = np.concatenate([MOTION, linear[len(MOTION) :]])
         is_inflow = self._places >= self.layout.inflow(0).start
         self.coordinates = BODY_UNKNOWNS + np.flatnonzero(~is_inflow)
         self.inflow = BODY_UNKNOWNS + np.flatnonzero(is_inflow)
@@ -221,6 +229,41 @@ class TrimProblem:
         averaged_derivative(self.params, x, swash, self.azimuth_count, np.zeros(3), self.work, self._dx, self.loads)
         return self._dx[self.equations] / self.scales
 
+    def jacobian(self, condition: TrimCondition, unknowns: Array) -> Array:
+        """Derivative of `residual` by the unknowns, shape (n, n).
+
+        Central differences in one call of compiled code, so that trims in several threads hardly wait for each other.
+        Pitch and roll act by the attitude, and by the axes in which the condition's motion is taken.
+        """
+        x, _ = self.state(condition, unknowns)
+        size = self.layout.linear_size
+        inputs = np.concatenate([self.layout.to_linear(x), unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS]])
+        rotor = self._places - S.BODY_SIZE + S.LINEAR_BODY_SIZE
+        steps = np.zeros(len(inputs))  # the rates of flap and lag are no unknowns
+        steps[: S.LINEAR_BODY_SIZE] = BODY_STEP
+        steps[rotor] = steps[size:] = ROTOR_STEP
+        steps[[S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]] *= condition.turn_rate != 0.0
+        blades = np.array(self.layout.blades)
+        psi = 2 * np.pi * np.arange(self.azimuth_count)[:, None] / (blades * self.azimuth_count)
+        outputs = size + SPECIFIC_FORCE_SIZE + self.loads.size
+        each = np.zeros((self.azimuth_count, len(inputs), outputs))
+        swash = np.zeros((len(blades), len(S.SWASHPLATE_NAMES)))
+        jacobian(self.params, inputs, self._mixing, steps, psi, np.zeros(3), self.work, swash, each)
+        slopes = each.mean(axis=0).T[self._linear_equations]
+        columns = [
+            slopes[:, angle] + slopes[:, MOTION] @ self._motion_slope(condition, unknowns, i)
+            for i, angle in enumerate((S.LINEAR_THETA, S.LINEAR_PHI))
+        ]
+        return np.column_stack([*columns, slopes[:, size:], slopes[:, rotor]]) / self.scales[:, None]
+
+    def _motion_slope(self, condition: TrimCondition, unknowns: Array, i: int) -> Array:
+        """Derivative of u, v, w, p, q, r by pitch (i = 0) or roll (1)."""
+        forward, backward = unknowns[:ATTITUDE_UNKNOWNS].copy(), unknowns[:ATTITUDE_UNKNOWNS].copy()
+        forward[i] += BODY_STEP
+        backward[i] -= BODY_STEP
+        change = np.subtract(condition.motion(*forward), condition.motion(*backward))
+        return change.ravel() / (2 * BODY_STEP)
+
     def worst_equation(self, residual: Array) -> str:
         """Name of the equation with the largest residual, as "d(state)/dt"."""
         worst = int(np.argmax(np.abs(residual)))
@@ -259,6 +302,7 @@ class TrimProblem:
             iterations=iterations,
             inner_iterations=inner_iterations,
             beyond_limits=self.beyond_limits(unknowns),
+            parameter_hash=self.aircraft.parameter_hash,
         )
 
 

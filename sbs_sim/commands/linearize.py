@@ -109,7 +109,8 @@ def _print_model(craft: "Aircraft", model: "LinearModel") -> None:
     headings = ["mode", "real [rad/s]", "imaginary", "frequency", "damping", "half [s]", "double [s]", "leading states"]
     print_table(headings, rows, left=(0, 7))
     print()
-    print(f"azimuth spread {model.azimuth_spread:.3g}")
+    spread = model.azimuth_spread
+    print("azimuth spread unknown from one azimuth" if spread != spread else f"azimuth spread {spread:.3g}")
     print(f"parameters {model.parameter_hash}")
     for text in model.trim.beyond_limits:
         print(f"beyond its limits: {text}")

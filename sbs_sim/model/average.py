@@ -2,7 +2,7 @@
 
 import math
 
-from sbs_sim.model.dynamics import derivative
+from sbs_sim.model.dynamics import evaluate
 from sbs_sim.model.kernel import entry
 
 
@@ -31,7 +31,7 @@ def averaged_derivative(p, x, swash, azimuth_count, still_air, work, dx, loads):
         for j in range(p.rotor.shape[0]):
             n_blades = p.first_blade[j + 1] - p.first_blade[j]
             work.psi[j] = 2.0 * math.pi * k / (n_blades * azimuth_count)
-        derivative(p, x, swash, work.psi, still_air, work, slope)
+        evaluate(p, x, swash, work.psi, still_air, work, slope)
         for i in range(dx.size):
             dx[i] += slope[i] / azimuth_count
         for j in range(p.rotor.shape[0]):

@@ -42,6 +42,16 @@ def derivative(p, x, swash, psi, wind, work, dx):
     dx : ndarray, shape (size,)
         Output.
     """
+    evaluate(p, x, swash, psi, wind, work, dx)
+
+
+@kernel
+def evaluate(p, x, swash, psi, wind, work, dx):
+    """What `derivative` does, for compiled callers.
+
+    They must not call the entry: its machine code would be in theirs as well, and of equal names the loader takes the
+    first that it meets, which may be optimised otherwise. The last bits would then hang on what was loaded first.
+    """
     rot, om, g = _known_terms(p, x, swash, psi, wind, work)
     if p.switches[P.COMPLETE_COUPLING] == 1:
         _solve_with_blades(p, work)

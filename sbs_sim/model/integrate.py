@@ -4,7 +4,7 @@ import math
 
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
-from sbs_sim.model.dynamics import derivative
+from sbs_sim.model.dynamics import evaluate
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_rotation_terms
 from sbs_sim.model.wind import wind_at
@@ -66,7 +66,7 @@ def _step(p, x, swash, psi0, number, h, wind, fraction, share, method, work):
         ahead = 0.5 * ((k + 1) // 2)  # 0, 1/2, 1/2, 1
         _azimuths(p, psi0, number, ahead, h, work.psi)
         wind_at(wind, time + ahead * h, fraction + ahead * share, work.wind)
-        derivative(p, stage, swash, work.psi, work.wind, work, slope)
+        evaluate(p, stage, swash, work.psi, work.wind, work, slope)
         if method == PARTITIONED:
             if k == 0:
                 _copy(slope, first)

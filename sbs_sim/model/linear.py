@@ -8,7 +8,7 @@ import math
 
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
-from sbs_sim.model.dynamics import derivative
+from sbs_sim.model.dynamics import evaluate
 from sbs_sim.model.kernel import entry, kernel
 
 SPECIFIC_FORCE_SIZE = 3
@@ -51,7 +51,7 @@ def jacobian(p, point, mixing, steps, psi, still_air, work, swash, out):
             for k in range(psi.shape[0]):
                 for j in range(psi.shape[1]):
                     work.psi[j] = psi[k, j]
-                derivative(p, work.stages[1], swash, work.psi, still_air, work, work.stages[0])
+                evaluate(p, work.stages[1], swash, work.psi, still_air, work, work.stages[0])
                 _add_outputs(p, point, work, sign / (2.0 * steps[i]), out[k, i])
         point[i] = middle
 

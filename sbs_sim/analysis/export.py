@@ -8,7 +8,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,10 +42,8 @@ def save(model: "LinearModel", path: str | Path) -> None:
         Another suffix, or a file that cannot be written.
     """
     path = Path(path)
-    encode = ENCODERS.get(path.suffix.lower())
-    if encode is None:
-        raise ExportError(f"{path}: allowed are names that end in {', '.join(ENCODERS)}")
-    write(path, encode(model))
+    check_target(path, ENCODERS)
+    write(path, ENCODERS[path.suffix.lower()](model))
 
 
 def write(path: str | Path, content: bytes | str) -> None:
@@ -62,6 +60,30 @@ def write(path: str | Path, content: bytes | str) -> None:
     except (OSError, ValueError) as error:  # the latter for names that no file can have
         reason = f"there is no folder {path.parent}" if _no_folder(path.parent) else _reason(error)
         raise ExportError(f"{path}: cannot be written: {reason}") from None
+
+
+def check_target(path: str | Path | None, suffixes: Collection[str] = ()) -> None:
+    """Raise what `write` would, as far as it can be known before the work of which it is to keep the result.
+
+    Parameters
+    ----------
+    path : str or Path, optional
+        None is fine.
+    suffixes : collection of str
+        Those that are allowed; all if empty.
+
+    Raises
+    ------
+    ExportError
+        Another suffix, or no folder to write in.
+    """
+    if path is None:
+        return
+    path = Path(path)
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise ExportError(f"{path}: allowed are names that end in {', '.join(suffixes)}")
+    if _no_folder(path.parent):
+        raise ExportError(f"{path}: cannot be written: there is no folder {path.parent}")
 
 
 def _no_folder(folder: Path) -> bool:

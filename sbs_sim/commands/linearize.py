@@ -63,13 +63,19 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.analysis.export import to_json, write
+    from sbs_sim.analysis.export import ENCODERS, check_target, to_json, write
     from sbs_sim.analysis.linearize import linearize
 
+    check_target(arguments.export, ENCODERS)
+    check_target(arguments.json)
     craft = aircraft(arguments)
     full = linearize(craft, **flight(arguments), method=arguments.method)
     model = full.quasi_static() if arguments.quasi_static else full
     _print_model(craft, model)
+    if arguments.export:
+        model.save(arguments.export)
+    if arguments.json:
+        write(arguments.json, to_json(model.to_dict()))
     if arguments.participation:
         _print_participation(model)
     if arguments.floquet:
@@ -81,10 +87,6 @@ def _work(arguments: argparse.Namespace) -> None:
     if arguments.matrices:
         _print_matrix("A", model.a, model.state_names, model.state_names)
         _print_matrix("B", model.b, model.state_names, model.control_names)
-    if arguments.export:
-        model.save(arguments.export)
-    if arguments.json:
-        write(arguments.json, to_json(model.to_dict()))
 
 
 def _print_model(craft: "Aircraft", model: "LinearModel") -> None:

@@ -40,9 +40,10 @@ def _parser() -> argparse.ArgumentParser:
 
 def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.aircraft import Aircraft
-    from sbs_sim.analysis.export import to_json, write
+    from sbs_sim.analysis.export import check_target, to_json, write
     from sbs_sim.analysis.reproduce import reproduce
 
+    check_target(arguments.json)
     craft, paper_craft = Aircraft.load(arguments.aircraft), Aircraft.load(arguments.paper_aircraft)
     if arguments.out:  # a bad path is told before the work, not after it
         from sbs_sim.analysis.page import make_folder

@@ -69,9 +69,11 @@ def _work(arguments: argparse.Namespace) -> None:
     values = _values(arguments)
     if typed.endswith("_deg") and typed in TYPED:
         values = [math.radians(value) for value in values]
-    from sbs_sim.analysis.export import sweep_to_csv, to_json, write
+    from sbs_sim.analysis.export import check_target, sweep_to_csv, to_json, write
     from sbs_sim.analysis.sweep import sweep
 
+    check_target(arguments.csv)
+    check_target(arguments.json)
     craft = aircraft(arguments)
     with _progress_bar(len(values)) as progress:
         found = sweep(

@@ -38,9 +38,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.analysis.export import to_json, write
+    from sbs_sim.analysis.export import check_target, to_json, write
     from sbs_sim.analysis.trim import trim
 
+    check_target(arguments.json)
     craft = aircraft(arguments)
     point = trim(craft, **flight(arguments), method=arguments.method)
     print_trim(craft, point)

@@ -33,6 +33,10 @@ class LinearizationError(SbsError):
     """A linear model that cannot be made."""
 
 
+class RecordingError(SbsError):
+    """A log that cannot be written or read."""
+
+
 class SimulationError(SbsError):
     """A simulation that cannot start or cannot go on."""
 

@@ -22,13 +22,16 @@ from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
 
 EXECUTABLES = Path(__file__).resolve().parent.parent / "install" / "sbs_sim" / "lib" / "sbs_sim"
-DOMAINS = itertools.cycle(1 + (os.getpid() + i) % 100 for i in range(100))
+# Of 100 domains every process of a parallel test run has its own 25.
+_WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % 4
+DOMAINS = itertools.cycle(1 + 25 * _WORKER + (os.getpid() + i) % 25 for i in range(25))
 PATIENCE = 30.0  # s of wall time; generous, for machines that are busy
 
 
-def environment(domain: int) -> dict[str, str]:
-    """Environment of a process in a DDS domain of its own on this machine."""
-    return {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+def environment(domain: int, folder: Path | None = None) -> dict[str, str]:
+    """Environment of a process in a DDS domain of its own on this machine, its logs in a folder."""
+    own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    return {**os.environ, **own, **({"SBS_SIM_BAGS": str(folder / "bags")} if folder else {})}
 
 
 class Process:
@@ -42,7 +45,9 @@ class Process:
         for remap in remaps:
             command += ["-r", remap]
         with self.log.open("w") as out:
-            self._popen = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT, env=environment(domain))
+            self._popen = subprocess.Popen(
+                command, stdout=out, stderr=subprocess.STDOUT, env=environment(domain, folder)
+            )
         self.pid = self._popen.pid
 
     @property

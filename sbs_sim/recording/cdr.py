@@ -1,0 +1,255 @@
+"""Messages in CDR to arrays.
+
+The messages of a topic mostly have their values at the same places, for their texts and lists keep their lengths. Then
+one numpy structured type describes them all, and all are taken apart at once; `Layout` makes it. Where the lengths
+vary, `decode_one_by_one` does the same message by message with the package `mcap_ros2`.
+
+CDR as ROS 2 writes it (XCDR1): 4 bytes say the byte order, and every number stands at a multiple of its size, counted
+from behind these 4. A text is its length, with a closing zero, and its bytes; a list is its length and its values.
+What stands in the gaps is left to chance. So are some bytes at the end, for Fast DDS reckons with a gap in front of the
+values of an empty list and then writes none.
+"""
+
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
+from numpy.typing import NDArray
+
+from sbs_sim.errors import RecordingError
+from sbs_sim.recording.definitions import NUMBERS, PRIMITIVES, SEQUENCE, Definitions, Field
+
+Columns = dict[str, NDArray[Any]]
+
+HEAD = 4  # bytes in front of the message
+PADDING = 3  # bytes that may follow it
+
+
+class Layout:
+    """Places of all values in a message; they are the same in all messages with the same lengths.
+
+    Parameters
+    ----------
+    definitions : dict
+        See `sbs_sim.recording.definitions.parse`.
+    root : str
+        Type of the message, package/Type.
+    sample : bytes
+        A message.
+
+    Raises
+    ------
+    RecordingError
+        The message is not of that type, or of a kind that cannot be read.
+    """
+
+    def __init__(self, definitions: Definitions, root: str, sample: bytes) -> None:
+        if len(sample) < HEAD or sample[0] != 0 or sample[1] > 1:
+            raise RecordingError(f"{root}: messages in plain CDR can be read, this one begins {sample[:HEAD].hex(' ')}")
+        self._order = "<" if sample[1] else ">"
+        self._definitions, self._sample = definitions, sample
+        self._offset = HEAD
+        self._padding = PADDING
+        self._places: dict[str, tuple[str | tuple[str, tuple[int]], int]] = {"#order": ("u2", 0)}
+        self._constants = {"#order": int.from_bytes(sample[:2], "little")}  # what must be alike in all messages
+        self._columns: dict[str, list[str] | None] = {}  # places of the texts of a column that is a list of texts
+        self._texts: set[str] = set()  # columns that are single texts
+        self._message(root, "")
+        if not 0 <= len(sample) - self._offset <= self._padding:
+            raise RecordingError(f"a message of {len(sample)} bytes does not agree with the definition of {root}")
+
+    def decode(self, messages: Sequence[bytes]) -> Columns | None:
+        """Values of many messages by flattened names, if all have this layout."""
+        size = len(self._sample)
+        if any(len(message) != size for message in messages):
+            return None
+        names = list(self._places)
+        formats, offsets = zip(*self._places.values(), strict=True)
+        dtype = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
+        values = np.frombuffer(b"".join(messages), dtype)
+        if any((values[name] != value).any() for name, value in self._constants.items()):
+            return None
+        return {name: self._column(values, name, places) for name, places in self._columns.items()}
+
+    def _column(self, values: NDArray[Any], name: str, places: list[str] | None) -> NDArray[Any]:
+        if places is not None:
+            texts = [self._text(values, place) for place in places]
+            return np.stack(texts, axis=1) if texts else np.empty((len(values), 0), "U1")
+        if name in self._texts:
+            return self._text(values, name)
+        return np.ascontiguousarray(values[name], values[name].dtype.newbyteorder("="))
+
+    def _text(self, values: NDArray[Any], place: str) -> NDArray[np.str_]:
+        if place not in self._places:
+            return np.full(len(values), "")
+        raw = values[place]
+        if (raw == raw[0]).all():  # as the names of frames
+            return np.full(len(values), raw[0].decode())
+        return np.char.decode(raw, "utf-8")
+
+    def _message(self, kind: str, prefix: str) -> None:
+        if kind not in self._definitions:
+            raise RecordingError(f"there is no definition of {kind}")
+        for field in self._definitions[kind]:
+            self._field(field, prefix + field.name)
+        if not self._definitions[kind]:
+            self._offset += 1  # a message must not be empty, so an empty one has a byte
+
+    def _field(self, field: Field, name: str) -> None:
+        count = self._length(name) if field.count == SEQUENCE else field.count
+        if field.type in PRIMITIVES:
+            self._columns[name] = None
+        if field.type in NUMBERS:
+            self._number(name, NUMBERS[field.type], count)
+        elif field.type == "string":
+            if count is None:
+                self._string(name)
+                self._texts.add(name)
+            else:
+                self._columns[name] = places = [f"{name}[{index}]" for index in range(self._possible(count))]
+                for place in places:
+                    self._string(place)
+        elif field.type in PRIMITIVES:
+            raise RecordingError(f"{name}: values of type {field.type} cannot be read")
+        elif count is None:
+            self._message(field.type, f"{name}.")
+        else:
+            for index in range(self._possible(count)):
+                self._message(field.type, f"{name}[{index}].")
+
+    def _number(self, name: str, code: str, count: int | None) -> None:
+        size = np.dtype(code).itemsize
+        if count == 0:
+            self._padding += size - 1
+        else:
+            self._align(size)
+        kind = self._order + code
+        self._places[name] = (kind if count is None else (kind, (self._possible(count),)), self._offset)
+        self._offset += size * (1 if count is None else count)
+
+    def _string(self, name: str) -> None:
+        length = self._length(name)
+        if length > 1:
+            self._places[name] = (f"S{length - 1}", self._offset)
+        self._offset += self._possible(length)
+
+    def _length(self, name: str) -> int:
+        """A length in the sample, which must be the same in all messages."""
+        self._align(4)
+        try:
+            (length,) = struct.unpack_from(f"{self._order}I", self._sample, self._offset)
+        except struct.error:
+            raise RecordingError(f"a message ends before its field {name}") from None
+        self._places[f"#{name}"] = (f"{self._order}u4", self._offset)
+        self._constants[f"#{name}"] = length
+        self._offset += 4
+        return int(length)
+
+    def _possible(self, count: int) -> int:
+        """A number of things that cannot be more than there are bytes."""
+        if count > len(self._sample):
+            raise RecordingError(f"a message of {len(self._sample)} bytes cannot hold {count} values")
+        return count
+
+    def _align(self, size: int) -> None:
+        self._offset += -(self._offset - HEAD) % size
+
+
+def decode(schema: Schema, definitions: Definitions, root: str, messages: Sequence[bytes]) -> Columns:
+    """Values of the messages of a topic by flattened names.
+
+    Parameters
+    ----------
+    schema : Schema
+        The type as the recording has it, and taken apart:
+    definitions, root
+        See `Layout`.
+    messages : sequence of bytes
+
+    Returns
+    -------
+    dict of str to ndarray
+        By names such as `position.x` or `rotors[0].flap`. Numbers and texts have shape (n,), lists of them (n, length);
+        where the length of a list varies, an array of n arrays. Of a list of messages each place is a column; a
+        message that has fewer leaves NaN, or None where there is no NaN.
+
+    Raises
+    ------
+    RecordingError
+        The messages do not agree with their definition.
+    """
+    if not messages:
+        return dict(_empty(definitions, root, ""))
+    columns = Layout(definitions, root, messages[0]).decode(messages)
+    return decode_one_by_one(schema, definitions, root, messages) if columns is None else columns
+
+
+def decode_one_by_one(schema: Schema, definitions: Definitions, root: str, messages: Sequence[bytes]) -> Columns:
+    """The same as `decode`, for messages of any lengths."""
+    rows: list[dict[str, Any]] = []
+    fields: dict[str, Field] = {}
+    try:
+        read: Callable[[bytes], Any] | None = DecoderFactory().decoder_for("cdr", schema)
+        if read is None:
+            raise RecordingError(f"{root}: definitions of kind {schema.encoding!r} cannot be read")
+        for message in messages:
+            rows.append({})
+            _flatten(read(message), definitions, root, "", rows[-1], fields)
+    except RecordingError:
+        raise
+    except Exception as error:  # whatever a foreign definition leads to
+        raise RecordingError(f"a message does not agree with the definition of {root}: {error!r}") from None
+    return {name: _column(field, [row.get(name) for row in rows]) for name, field in fields.items()}
+
+
+def _flatten(
+    message: Any,
+    definitions: Definitions,
+    kind: str,
+    prefix: str,
+    row: dict[str, Any],
+    fields: dict[str, Field],
+) -> None:
+    for field in definitions[kind]:
+        name, value = prefix + field.name, getattr(message, field.name)
+        if field.type in PRIMITIVES:
+            row[name], fields[name] = value, field
+        elif field.count is None:
+            _flatten(value, definitions, field.type, f"{name}.", row, fields)
+        else:
+            for index, item in enumerate(value):
+                _flatten(item, definitions, field.type, f"{name}[{index}].", row, fields)
+
+
+def _empty(definitions: Definitions, kind: str, prefix: str) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Columns of no messages, as far as they can be known."""
+    for field in definitions.get(kind, ()):
+        if field.type in PRIMITIVES:
+            shape = (0,) if field.count is None else (0, max(0, field.count))
+            yield prefix + field.name, np.empty(shape, NUMBERS.get(field.type, "U1"))
+        elif field.count is None:
+            yield from _empty(definitions, field.type, f"{prefix}{field.name}.")
+
+
+def _column(field: Field, values: list[Any]) -> NDArray[Any]:
+    code = NUMBERS.get(field.type, "U")
+    if field.count is not None:
+        lists = [None if value is None else np.array(list(value), code) for value in values]
+        shapes = {None if item is None else item.shape for item in lists}
+        if len(shapes) == 1 and None not in shapes:
+            return np.stack([item for item in lists if item is not None])
+        return _objects(lists)
+    if None not in values:
+        return np.array(values, code)
+    if code in ("f4", "f8"):
+        return np.array([np.nan if value is None else value for value in values], code)
+    return _objects(values)
+
+
+def _objects(values: list[Any]) -> NDArray[np.object_]:
+    column = np.empty(len(values), object)
+    column[:] = values
+    return column

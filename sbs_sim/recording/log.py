@@ -1,0 +1,203 @@
+"""Reading a recording into arrays: `log["state"]["position.x"]`."""
+
+import importlib
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.records import Schema
+from numpy.typing import NDArray
+
+from sbs_sim.errors import RecordingError
+from sbs_sim.recording.cdr import Columns, decode
+from sbs_sim.recording.definitions import Definitions, Units, parse, short_name
+from sbs_sim.recording.mcap_log import START
+from sbs_sim.recording.scan import Content, Scan, Source, scan
+
+
+class Topic(Mapping[str, NDArray[Any]]):
+    """The messages of a topic as arrays by the names of their fields, in the order in which they were recorded.
+
+    Fields of fields are joined by dots (`position.x`), places in lists of messages stand in brackets
+    (`rotors[0].flap`). See `sbs_sim.recording.cdr.decode` for the shapes. Numbers keep their types.
+
+    Attributes
+    ----------
+    name : str
+    type : str
+        package/msg/Type
+    time_ns : ndarray of int64, shape (n,)
+        Time of each message [ns].
+    """
+
+    def __init__(self, name: str, schema: Schema, times: list[int], messages: list[bytes]) -> None:
+        self.name, self.type = name, schema.name
+        self.time_ns = np.array(times, np.uint64).view(np.int64)
+        self._schema = schema
+        self._messages = messages
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time of each message [s], shape (n,)."""
+        return self.time_ns.astype(np.float64) / 1e9
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Units by the names of the fields, as far as the definition says them; empty where it does not."""
+        units = Units(self._definitions, short_name(self.type))
+        return {name: units[name] for name in self}
+
+    def to_pandas(self) -> Any:
+        """A pandas.DataFrame over time [s]; of lists each place is a column, such as `rotors[0].flap[2]`.
+
+        Raises
+        ------
+        RecordingError
+            There is no pandas.
+        """
+        try:
+            pandas = importlib.import_module("pandas")
+        except ImportError:
+            raise RecordingError("to_pandas needs pandas: python3 -m pip install pandas") from None
+        columns: dict[str, NDArray[Any]] = {}
+        for name, values in self.items():
+            if values.ndim == 1:
+                columns[name] = values
+            else:
+                columns.update({f"{name}[{place}]": values[:, place] for place in range(values.shape[1])})
+        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
+
+    @cached_property
+    def _definitions(self) -> Definitions:
+        return parse(self.type, self._schema.data.decode(errors="replace"))
+
+    @cached_property
+    def _columns(self) -> Columns:
+        """Decoded when it is first asked for."""
+        try:
+            return decode(self._schema, self._definitions, short_name(self.type), self._messages)
+        except (RecordingError, UnicodeDecodeError) as error:
+            raise RecordingError(f"topic {self.name}: {error}") from None
+        finally:
+            self._messages = []
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self._columns:
+            raise KeyError(f"topic {self.name} has no field {name!r}; there are {', '.join(self._columns)}")
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def __repr__(self) -> str:
+        return f"<topic {self.name}: {len(self.time_ns)} messages of type {self.type}>"
+
+
+class Log(Mapping[str, Topic]):
+    """A recording in memory: topics by name, with or without the leading slash.
+
+    Attributes
+    ----------
+    path : Path
+    metadata : dict of str to dict of str to str
+        Metadata records by name; `recording` has the program, and the wall time of the start.
+    attachments : dict of str to bytes
+        Files by name.
+    complete : bool
+        True if all that was recorded is here.
+    reasons : tuple of str
+        What is wrong with the file, one line each.
+    """
+
+    def __init__(self, path: Path, found: Scan, topics: dict[str, Topic]) -> None:
+        self.path = path
+        self.metadata = found.metadata
+        self.attachments = {name: attachment.data for name, attachment in found.attachments.items()}
+        self.complete = found.complete
+        self.reasons = tuple(found.reasons)
+        self._topics = topics
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Names of the topics."""
+        return tuple(self._topics)
+
+    @property
+    def wall_start_ns(self) -> int | None:
+        """Wall time of the start [ns since 1970], if the recording says it."""
+        text = self.metadata.get(START, {}).get("wall_start_ns")
+        return None if text is None else int(text)
+
+    def __getitem__(self, name: str) -> Topic:
+        for key in (name, f"/{name}"):
+            if key in self._topics:
+                return self._topics[key]
+        raise KeyError(f"{self.path} has no topic {name!r}; there are {', '.join(self._topics) or 'none'}")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._topics)
+
+    def __len__(self) -> int:
+        return len(self._topics)
+
+    def __repr__(self) -> str:
+        state = "complete" if self.complete else "incomplete"
+        return f"<{state} recording {self.path} of {', '.join(self._topics) or 'nothing'}>"
+
+
+def read(path: str | Path) -> Log:
+    """Read a recording, as much of it as is whole.
+
+    Every byte that is used is covered by a checksum that is right. What is missing is told by `complete` and `reasons`.
+
+    Parameters
+    ----------
+    path : path-like
+        An MCAP file with ROS 2 messages.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be read, or nothing in it is whole.
+    """
+    times: dict[int, list[int]] = {}
+    messages: dict[int, list[bytes]] = {}
+
+    def take(content: Content) -> None:
+        data = content.data
+        for channel, _, log_time, _, start, end in content.messages:
+            if channel not in times:
+                times[channel], messages[channel] = [], []
+            times[channel].append(log_time)
+            messages[channel].append(data[start:end])
+
+    with Source(Path(path)) as source:
+        found = scan(source, take)
+    require_something(source, found)
+    for number in times.keys() - found.channels.keys():
+        found.reasons.append(f"{len(times[number])} messages of a topic whose definition is lost")
+        found.complete = False
+    topics: dict[str, Topic] = {}
+    for number, channel in sorted(found.channels.items()):
+        if channel.topic in topics:
+            raise RecordingError(f"cannot read {path}: topic {channel.topic} is recorded twice")
+        schema = found.schemas[channel.schema_id]
+        topics[channel.topic] = Topic(channel.topic, schema, times.get(number, []), messages.get(number, []))
+    return Log(source.path, found, topics)
+
+
+def require_something(source: Source, found: Scan) -> None:
+    """Raise the error of a file that is of no use; one without messages is, if it is complete.
+
+    Raises
+    ------
+    RecordingError
+    """
+    if not found.messages and not found.complete:
+        why = "; ".join(found.reasons[:3])
+        raise RecordingError(f"nothing in {source.path} can be read: no chunk of it is whole: {why}")

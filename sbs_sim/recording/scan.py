@@ -1,0 +1,576 @@
+"""Reading a recording so that nothing is taken on trust: whole files, truncated ones and damaged ones.
+
+The file is gone through from its start to its end. Taken are chunks, attachments and metadata whose checksum is right;
+the definitions of types and topics come from the chunks and from the summary, which has one too. Where a record makes
+no sense the search goes on at the next place known from the summary or the next bytes that look like a chunk.
+"""
+
+import bisect
+import io
+import os
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    Footer,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+from mcap.stream_reader import get_chunk_data_stream
+
+from sbs_sim.errors import RecordingError
+from sbs_sim.recording.mcap_file import CHECKSUM, MAGIC, MESSAGE_HEAD, ROSBAG2, metadata_checksum, reason, serialize
+
+RECORD_HEAD = struct.Struct("<BQ")  # opcode, length
+CHUNK_HEAD = struct.Struct(
+    "<BQQQQII"
+)  # opcode, length; start and end time, size, checksum, length of compression's name
+CHUNK_SIGNATURE = b"\x04\x00\x00\x00zstd"  # of the chunks that we write, at the end of CHUNK_HEAD
+SIGNATURE_PLACE = CHUNK_HEAD.size - 4
+DATA_END_SIZE = RECORD_HEAD.size + 4
+FOOTER_SIZE = RECORD_HEAD.size + 20
+LARGEST = 1 << 28  # bytes of a record, packed or not: a damaged one may claim to need all memory that there is
+# Records that may stand between chunks. Schemas and channels count in chunks only, where they have a checksum.
+OTHER_RECORDS = frozenset(
+    (
+        Opcode.HEADER,
+        Opcode.SCHEMA,
+        Opcode.CHANNEL,
+        Opcode.MESSAGE_INDEX,
+        Opcode.ATTACHMENT,
+        Opcode.METADATA,
+    )
+)
+BLOCK = 1 << 20
+MOST_REASONS = 100  # a file of another kind can be wrong at every message
+# What the reading of nonsense can end with: short data, wrong text, a decompressor's complaint, absurd sizes.
+NONSENSE = (
+    struct.error,
+    ValueError,
+    McapError,
+    zstandard.ZstdError,
+    RuntimeError,
+    MemoryError,
+    OverflowError,
+    LookupError,
+)
+
+
+Extent = tuple[int, int, int]  # size of a chunk's content, earliest and latest time [ns]
+
+
+class DamageError(Exception):
+    """A place in the file that makes no sense; the text says why."""
+
+
+@dataclass
+class Content:
+    """What a chunk holds.
+
+    Attributes
+    ----------
+    data : bytes
+        Decompressed.
+    schemas, channels : dict
+        Records by number.
+    messages : list of tuple
+        Channel, sequence, log time [ns], publish time [ns], and where in `data` the message begins and ends.
+    """
+
+    data: bytes
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    messages: list[tuple[int, int, int, int, int, int]] = field(default_factory=list)
+
+    def extent(self) -> Extent:
+        """What identifies the chunk."""
+        times = [message[2] for message in self.messages] or [0]
+        return len(self.data), min(times), max(times)
+
+
+@dataclass
+class Summary:
+    """What a summary with a right checksum says."""
+
+    start: int
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    chunks: dict[int, Extent] = field(default_factory=dict)  # by where they begin
+    attachments: dict[int, str] = field(default_factory=dict)  # names by where they begin
+    metadata: dict[int, str] = field(default_factory=dict)
+    messages: int = -1  # all of them; unknown if there are no statistics
+
+    def places(self) -> list[int]:
+        """Where records begin that matter."""
+        return sorted([*self.chunks, *self.attachments, *self.metadata])
+
+
+@dataclass
+class Scan:
+    """What is whole in a file.
+
+    Attributes
+    ----------
+    schemas, channels : dict
+        Records by number.
+    metadata : dict of str to dict
+    attachments : dict of str to Attachment
+    messages : int
+        Messages in whole chunks.
+    chunks : dict of int to tuple
+        Extents of the whole ones by where they begin.
+    reasons : list of str
+        What is wrong, one line each.
+    lost_bytes : int
+        Bytes that could not be used.
+    complete : bool
+        True if nothing that was recorded is missing.
+    """
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    attachments: dict[str, Attachment] = field(default_factory=dict)
+    messages: int = 0
+    chunks: dict[int, Extent] = field(default_factory=dict)
+    reasons: list[str] = field(default_factory=list)
+    lost_bytes: int = 0
+    complete: bool = False
+    unlisted: int = 0  # what is wrong besides
+
+    def note(self, reason: str) -> None:
+        """Add a reason, if there are not too many already."""
+        if len(self.reasons) < MOST_REASONS:
+            self.reasons.append(reason)
+        else:
+            self.unlisted += 1
+
+
+class Source:
+    """A file that is read at given places; a context that closes it.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be read: path and reason in one line. So do the methods.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._descriptor = -1
+        try:
+            self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+            self.size = os.lseek(self._descriptor, 0, os.SEEK_END)
+            os.pread(self._descriptor, 1, 0)  # a folder can be opened, but not read
+        except (OSError, ValueError) as error:
+            self.close()
+            raise RecordingError(f"cannot read {path}: {reason(error)}") from None
+
+    def at(self, offset: int, length: int) -> bytes:
+        """Bytes at a place.
+
+        Raises
+        ------
+        DamageError
+            The file ends before.
+        """
+        if not 0 <= length <= self.size - offset:
+            raise DamageError("the file ends in the middle of a record")
+        parts = []
+        while length:
+            try:
+                part = os.pread(self._descriptor, length, offset)
+            except OSError as error:
+                raise RecordingError(f"cannot read {self.path}: {reason(error)}") from None
+            if not part:
+                raise DamageError("the file ends in the middle of a record")
+            parts.append(part)
+            offset += len(part)
+            length -= len(part)
+        return parts[0] if len(parts) == 1 else b"".join(parts)
+
+    def blocks(self, start: int, end: int) -> Iterator[tuple[int, bytes]]:
+        """Everything between two places in handy blocks, each with its place."""
+        for offset in range(start, end, BLOCK):
+            yield offset, self.at(offset, min(BLOCK, end - offset))
+
+    def checksum(self, end: int) -> int:
+        """Checksum of everything before a place."""
+        crc = 0
+        for _, block in self.blocks(0, end):
+            crc = zlib.crc32(block, crc)
+        return crc
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+        self._descriptor = -1
+
+    def __enter__(self) -> "Source":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def scan(source: Source, take: Callable[[Content], None]) -> Scan:
+    """Go through a file and hand out the content of every chunk that is whole, in the order of the file."""
+    summary = read_summary(source)
+    found = Scan()
+    try:
+        data_end = _Walk(source, summary, found, take).go()
+    except DamageError as damage:  # it was longer when this began
+        raise RecordingError(f"cannot read {source.path}: {damage}") from None
+    if summary is not None:
+        found.schemas.update(summary.schemas)
+        found.channels.update(summary.channels)
+    if data_end and not found.lost_bytes and not found.reasons:
+        found.complete = True  # the checksum of everything is right
+    elif summary is not None:
+        found.complete = _nothing_missing(summary, found)
+    if found.unlisted:
+        found.reasons.append(f"{found.unlisted} more places like these")
+    if summary is None:
+        closed = data_end or (source.size >= len(MAGIC) and source.at(source.size - len(MAGIC), len(MAGIC)) == MAGIC)
+        found.reasons.append("the summary is damaged" if closed else "the recording was not closed: it has no end")
+    found.channels = {
+        number: channel for number, channel in found.channels.items() if channel.schema_id in found.schemas
+    }
+    return found
+
+
+def _nothing_missing(summary: Summary, found: Scan) -> bool:
+    """True if all that the summary names has been found; rosbag2's metadata can be made again."""
+    return (
+        summary.messages == found.messages
+        and summary.chunks.items() <= found.chunks.items()
+        and set(summary.attachments.values()) <= set(found.attachments)
+        and set(summary.metadata.values()) <= {*found.metadata, ROSBAG2}
+    )
+
+
+class _Walk:
+    """One way through a file."""
+
+    def __init__(self, source: Source, summary: Summary | None, found: Scan, take: Callable[[Content], None]) -> None:
+        self._source, self._summary, self._found, self._take = source, summary, found, take
+        self._places = summary.places() if summary else []
+        self._sure = len(MAGIC)  # end of the last record with a right checksum
+        self._seen: set[int] = set()  # where something was read, right or wrong
+        self._end = summary.start if summary else source.size
+
+    def go(self) -> bool:
+        """Go to the end; true if the end of the data is there and the checksum of all of it is right."""
+        offset = self._check_magic()
+        while offset < self._end:
+            self._seen.add(offset)
+            try:
+                opcode, length = RECORD_HEAD.unpack(self._source.at(offset, RECORD_HEAD.size))
+                if (opcode, length) == (Opcode.DATA_END, 4) and self._is_end(offset):
+                    return self._checksum_is_right(offset)
+                offset = self._chunk(offset) if opcode == Opcode.CHUNK else self._other(offset, opcode, length)
+            except DamageError as damage:
+                offset = self._after_damage(offset, str(damage))
+        return False
+
+    def _check_magic(self) -> int:
+        try:
+            if self._source.at(0, len(MAGIC)) != MAGIC:
+                self._found.reasons.append("the first bytes are not those of an MCAP file")
+        except DamageError:
+            self._found.reasons.append("the file is too short")
+        return len(MAGIC)
+
+    def _is_end(self, offset: int) -> bool:
+        """True if what looks like the end of the data is where the summary has it, or is not followed by chunks."""
+        if self._summary is not None:
+            return offset + DATA_END_SIZE == self._end
+        return self._next_place() == self._end
+
+    def _checksum_is_right(self, offset: int) -> bool:
+        (crc,) = struct.unpack("<I", self._source.at(offset + RECORD_HEAD.size, 4))
+        right = crc == self._source.checksum(offset)
+        if crc and not right and not self._found.reasons:
+            self._found.reasons.append("the checksum of the data is wrong, those of their parts are right")
+        return right
+
+    def _chunk(self, offset: int) -> int:
+        """Take a chunk; where the next record begins."""
+        content, following, note = self._content(offset)
+        if note:
+            self._found.note(f"byte {offset}: {note}")
+        self._found.chunks[offset] = content.extent()
+        self._found.messages += len(content.messages)
+        self._found.schemas.update(content.schemas)
+        self._found.channels.update(content.channels)
+        self._take(content)
+        self._sure = following
+        return following
+
+    def _content(self, offset: int) -> tuple[Content, int, str]:
+        """What `chunk_at` gives, if it is what the summary says of this place."""
+        content, following, note = chunk_at(self._source, offset, self._end)
+        if self._summary is not None and self._summary.chunks.get(offset) != content.extent():
+            raise DamageError("a chunk that the summary does not know")
+        return content, following, note
+
+    def _other(self, offset: int, opcode: int, length: int) -> int:
+        """Take another record; where the next one begins."""
+        if opcode not in OTHER_RECORDS:
+            raise DamageError("a damaged record, or a message without a checksum")
+        following = offset + RECORD_HEAD.size + length
+        if following > self._end or length > LARGEST:
+            raise DamageError("the file ends in the middle of a record")
+        data = self._source.at(offset + RECORD_HEAD.size, length)
+        if opcode == Opcode.ATTACHMENT:
+            attachment = whole_attachment(data)
+            self._found.attachments[attachment.name] = attachment
+            self._sure = following
+        elif opcode == Opcode.METADATA:
+            metadata = whole_metadata(data)
+            if metadata.name != ROSBAG2:
+                self._found.metadata[metadata.name] = metadata.metadata
+                self._sure = following
+        elif opcode == Opcode.MESSAGE_INDEX:
+            if length < 6 or struct.unpack_from("<I", data, 2)[0] != length - 6 or (length - 6) % 16:
+                raise DamageError("a message index is damaged, it is not needed")
+        elif opcode == Opcode.HEADER:
+            _whole(Header, data)
+        return following
+
+    def _after_damage(self, offset: int, why: str) -> int:
+        """Note the damage; where to go on."""
+        if self._is_chunk(offset):  # of which the first byte is wrong
+            return self._chunk(offset)
+        following = self._next_record(offset)
+        if following is None:
+            following = self._next_place()
+        lost = max(0, following - offset)
+        self._found.note(f"byte {offset}: {why} ({lost} bytes skipped)")
+        self._found.lost_bytes += lost
+        return following
+
+    def _next_record(self, offset: int) -> int | None:
+        """Where the next record begins, if the damaged one is no chunk and is followed by what looks like a record."""
+        try:
+            opcode, length = RECORD_HEAD.unpack(self._source.at(offset, RECORD_HEAD.size))
+            following = offset + RECORD_HEAD.size + length
+            if opcode == Opcode.CHUNK or following > self._end:
+                return None
+            opcode, length = RECORD_HEAD.unpack(self._source.at(following, RECORD_HEAD.size))
+        except DamageError:
+            return None
+        known = Opcode.HEADER <= opcode <= Opcode.DATA_END
+        return following if known and following + RECORD_HEAD.size + length <= self._end else None
+
+    def _next_place(self) -> int:
+        """Next record that the summary knows, or next bytes that are a whole chunk, or the end.
+
+        The search begins where what is sure ends, which may be before the damage: a message index has no checksum, and
+        one that is too long for its place ends within the next chunk.
+        """
+        index = bisect.bisect_left(self._places, self._sure)
+        limit = next((place for place in self._places[index:] if place not in self._seen), self._end)
+        overlap = b""
+        for place, block in self._source.blocks(self._sure, limit):
+            text = overlap + block
+            start = place - len(overlap)
+            hit = text.find(CHUNK_SIGNATURE)
+            while hit >= 0:
+                candidate = start + hit - SIGNATURE_PLACE
+                if candidate >= self._sure and self._is_chunk(candidate):
+                    return candidate
+                hit = text.find(CHUNK_SIGNATURE, hit + 1)
+            overlap = text[-len(CHUNK_SIGNATURE) + 1 :]
+        return limit
+
+    def _is_chunk(self, offset: int) -> bool:
+        try:
+            self._content(offset)
+        except DamageError:
+            return False
+        return True
+
+
+def chunk_at(source: Source, offset: int, end: int) -> tuple[Content, int, str]:
+    """Content of the chunk at a place, where the next record begins, and what is wrong with it all the same.
+
+    Of the chunk's fields only the checksum is believed; its length is there twice, and the right one is tried out.
+
+    Raises
+    ------
+    DamageError
+        There is no chunk whose checksum is right.
+    """
+    opcode, length, start, stop, size, crc, name_length = CHUNK_HEAD.unpack(source.at(offset, CHUNK_HEAD.size))
+    if name_length > 8:
+        raise DamageError("a chunk is damaged")
+    place = offset + CHUNK_HEAD.size
+    tail = source.at(place, name_length + 8)
+    compression, (inner,) = tail[:name_length], struct.unpack("<Q", tail[name_length:])
+    place += len(tail)
+    outer = length - (place - offset - RECORD_HEAD.size)
+    for data_length in dict.fromkeys((inner, outer)):
+        if not 0 <= data_length <= min(end - place, LARGEST):
+            continue
+        data = _decompress(source.at(place, data_length), compression, crc)
+        if data is not None:
+            content = chunk_content(data)
+            right = (opcode, inner, (size, start, stop)) == (Opcode.CHUNK, outer, content.extent())
+            return content, place + data_length, "" if right else "the head of a chunk is damaged, its content is whole"
+    if place + inner > end and place + outer > end:
+        raise DamageError("the file ends in the middle of a chunk")
+    raise DamageError("a chunk is damaged: its checksum is wrong" if crc else "a chunk has no checksum to trust")
+
+
+def _decompress(data: bytes, compression: bytes, crc: int) -> bytes | None:
+    """Content of a chunk if its checksum is right; a chunk without a checksum counts as damaged.
+
+    So does one without content: zeros look like one, the checksum of nothing being zero.
+    """
+    try:
+        size = LARGEST
+        if compression == b"zstd":
+            size = zstandard.get_frame_parameters(data).content_size
+            if size == zstandard.CONTENTSIZE_UNKNOWN:
+                size = LARGEST
+            if size > LARGEST:
+                return None
+        chunk = Chunk(compression.decode(), data, 0, 0, 0, size)
+        stream, length = get_chunk_data_stream(chunk)
+        content = stream.read(length)
+    except NONSENSE:
+        return None
+    return content if content and zlib.crc32(content) == crc else None
+
+
+def chunk_content(data: bytes) -> Content:
+    """Take a chunk's content apart.
+
+    Raises
+    ------
+    DamageError
+        It is no sequence of records.
+    """
+    content = Content(data)
+    offset, end, MESSAGE = 0, len(data), int(Opcode.MESSAGE)
+    add, unpack = content.messages.append, MESSAGE_HEAD.unpack_from
+    try:
+        while offset < end:
+            opcode, length = RECORD_HEAD.unpack_from(data, offset)
+            following = offset + RECORD_HEAD.size + length
+            if following > end:
+                raise ValueError
+            if opcode == MESSAGE:
+                _, _, channel, sequence, log_time, publish_time = unpack(data, offset)
+                add((channel, sequence, log_time, publish_time, offset + MESSAGE_HEAD.size, following))
+            elif opcode == Opcode.SCHEMA:
+                schema = _read(Schema, data[offset + RECORD_HEAD.size : following])
+                content.schemas[schema.id] = schema
+            elif opcode == Opcode.CHANNEL:
+                channel_record = _read(Channel, data[offset + RECORD_HEAD.size : following])
+                content.channels[channel_record.id] = channel_record
+            offset = following
+    except NONSENSE:
+        raise DamageError("a chunk makes no sense in spite of its right checksum") from None
+    return content
+
+
+def whole_attachment(data: bytes) -> Attachment:
+    """Attachment of a record, if its checksum is right."""
+    if len(data) < 4 or struct.unpack("<I", data[-4:])[0] != zlib.crc32(data[:-4]):
+        raise DamageError("an attachment is damaged: its checksum is wrong")
+    attachment: Attachment = _whole(Attachment, data)
+    return attachment
+
+
+def whole_metadata(data: bytes) -> Metadata:
+    """Metadata of a record without their checksum, if it is right; rosbag2's has none."""
+    metadata: Metadata = _whole(Metadata, data)
+    if metadata.name != ROSBAG2:
+        crc = metadata.metadata.pop(CHECKSUM, "")
+        if crc != metadata_checksum(metadata.name, metadata.metadata):
+            raise DamageError(f"the metadata {metadata.name!r} are damaged: their checksum is wrong")
+    return metadata
+
+
+def _whole(kind: Any, data: bytes) -> Any:
+    """A record, if writing it again gives the same bytes: the package's readers do not mind short or odd data."""
+    try:
+        record = _read(kind, data)
+        if serialize(record)[RECORD_HEAD.size :] == data:
+            return record
+    except NONSENSE:
+        pass
+    raise DamageError(f"a {kind.__name__.lower()} record is damaged")
+
+
+def _read(kind: Any, data: bytes) -> Any:
+    return kind.read(ReadDataStream(io.BytesIO(data)))
+
+
+def read_summary(source: Source) -> Summary | None:
+    """The summary, if there is one with a right checksum."""
+    try:
+        end = source.size - FOOTER_SIZE - len(MAGIC)
+        data = source.at(end, FOOTER_SIZE) if end > 0 else b""
+        if data[: RECORD_HEAD.size] != RECORD_HEAD.pack(Opcode.FOOTER, 20):
+            return None
+        footer = _read(Footer, data[RECORD_HEAD.size :])
+        if not len(MAGIC) <= footer.summary_start <= end:
+            return None
+        records = source.at(footer.summary_start, end - footer.summary_start)
+        if zlib.crc32(records + data[:-4]) != footer.summary_crc:
+            return None
+        return _summary_of(footer.summary_start, records)
+    except (DamageError, *NONSENSE):
+        return None
+
+
+def _summary_of(start: int, data: bytes) -> Summary:
+    summary = Summary(start)
+    offset = 0
+    while offset < len(data):
+        opcode, length = RECORD_HEAD.unpack_from(data, offset)
+        following = offset + RECORD_HEAD.size + length
+        content = data[offset + RECORD_HEAD.size : following]
+        if opcode == Opcode.SCHEMA:
+            schema = _read(Schema, content)
+            summary.schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = _read(Channel, content)
+            summary.channels[channel.id] = channel
+        elif opcode == Opcode.CHUNK_INDEX:
+            chunk = _read(ChunkIndex, content)
+            extent = chunk.uncompressed_size, chunk.message_start_time, chunk.message_end_time
+            summary.chunks[chunk.chunk_start_offset] = extent
+        elif opcode == Opcode.STATISTICS:
+            summary.messages = _read(Statistics, content).message_count
+        elif opcode == Opcode.ATTACHMENT_INDEX:
+            attachment = _read(AttachmentIndex, content)
+            summary.attachments[attachment.offset] = attachment.name
+        elif opcode == Opcode.METADATA_INDEX:
+            metadata = _read(MetadataIndex, content)
+            summary.metadata[metadata.offset] = metadata.name
+        offset = following
+    return summary

@@ -1,0 +1,1092 @@
+"""Recordings: written with real messages, read by other people's readers, killed, cut and damaged."""
+
+import importlib.util
+import itertools
+import math
+import os
+import random
+import resource
+import struct
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.records import Schema
+from mcap.writer import Writer
+from ruamel.yaml import YAML
+
+from sbs_sim.errors import RecordingError
+from sbs_sim.recording import LogWriter, message_definition, qos_profiles, read, recover
+from sbs_sim.recording.cdr import Layout, decode, decode_one_by_one
+from sbs_sim.recording.definitions import SEQUENCE, Units, fields_of, parse, short_name
+from sbs_sim.recording.mcap_file import NewFile
+from sbs_sim.recording.mcap_log import CHUNK_SIZE
+from sbs_sim.recording.scan import LARGEST, Source, scan
+from sbs_sim.simulation import Simulation, trimmed_state
+
+TOOL = Path(__file__).resolve().parent.parent / "tools" / "crash_recording.py"
+NUMBER = "float64 value  # [m]\n"
+TICKS = 250
+
+
+def load_tool():
+    """tools/crash_recording.py, which has the damages and what must hold after them."""
+    spec = importlib.util.spec_from_file_location("crash_recording", TOOL)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["crash_recording"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+crash = load_tool()
+
+
+def number_message(value):
+    return struct.pack("<4Bd", 0, 1, 0, 0, value)
+
+
+def new_log(path, **options):
+    return LogWriter(path, library="test 1", wall_start=1_700_000_000_123_456_789, **options)
+
+
+def add_number(log, topic="/number"):
+    return log.add_channel(topic, "test_msgs/msg/Number", NUMBER, qos_profiles())
+
+
+def wait_until(condition):
+    end = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+# -- real messages -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def ros():
+    """What of ROS these tests use."""
+    pytest.importorskip("rclpy")
+    from ament_index_python.packages import get_package_share_directory
+    from rclpy.serialization import deserialize_message, serialize_message
+    from rosidl_parser.definition import NamespacedType  # noqa: F401
+
+    def find_file(package, name):
+        return Path(get_package_share_directory(package)) / name
+
+    def kind(type_name):
+        package, _, name = type_name.split("/")
+        return getattr(importlib.import_module(f"{package}.msg"), name)
+
+    return types.SimpleNamespace(
+        serialize=serialize_message,
+        deserialize=lambda data, type_name: deserialize_message(data, kind(type_name)),
+        find_file=find_file,
+        kind=kind,
+        definition=lambda type_name: message_definition(type_name, find_file),
+    )
+
+
+TYPES = {
+    "/state": "sbs_msgs/msg/BodyState",
+    "/rotors": "sbs_msgs/msg/RotorStateArray",
+    "/inflow": "sbs_msgs/msg/InflowArray",
+    "/odom": "nav_msgs/msg/Odometry",
+    "/clock": "rosgraph_msgs/msg/Clock",
+    "/status": "sbs_msgs/msg/SimulationStatus",
+    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+    "/never": "sbs_msgs/msg/Controls",
+}
+
+
+def flight_messages(ros, aircraft, hover):
+    """Messages of a short flight: topic, time [ns], message."""
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+    from rosgraph_msgs.msg import Clock
+
+    from sbs_msgs.msg import SimulationStatus
+    from sbs_sim.nodes.conversions import StateMessages, to_time
+
+    simulation = Simulation(aircraft, trimmed_state(aircraft, hover), hover.swashplate)
+    messages = StateMessages(aircraft)
+    for tick in range(TICKS):
+        simulation.swashplate = hover.swashplate + 0.001 * math.sin(0.1 * tick)
+        simulation.advance()
+        messages.fill(simulation.snapshot())
+        time_ns = round(simulation.time * 1e9)
+        yield "/clock", time_ns, Clock(clock=to_time(simulation.time))
+        for topic in ("/state", "/rotors", "/inflow", "/odom"):
+            yield topic, time_ns, getattr(messages, topic[1:])
+        fault = "" if tick < TICKS - 3 else "step 7: höher als plausibel"  # its length changes: no constant layout
+        yield "/status", time_ns, SimulationStatus(steps=tick, sim_time=simulation.time, fault=fault)
+        if tick % 50 == 0:
+            values = [KeyValue(key=str(number), value="x" * number) for number in range(tick // 50)]
+            yield "/diagnostics", time_ns, DiagnosticArray(status=[DiagnosticStatus(name="a", values=values)])
+
+
+@pytest.fixture(scope="module")
+def flight(ros, sbs, hover, tmp_path_factory):
+    """A recording of a short flight and all that went into it: path, [(topic, time [ns], bytes)]."""
+    path = tmp_path_factory.mktemp("flight") / "flight.mcap"
+    attachments = {"sbs.yaml": b"mass: 1\n", "empty": b""}
+    sent = []
+    with new_log(path, metadata={"aircraft": {"name": "sbs", "städte": "ü"}}, attachments=attachments) as log:
+        channels = {
+            topic: log.add_channel(topic, name, ros.definition(name), qos_profiles()) for topic, name in TYPES.items()
+        }
+        for topic, time_ns, message in flight_messages(ros, sbs, hover):
+            data = ros.serialize(message)
+            assert log.write(channels[topic], time_ns, data)
+            sent.append((topic, time_ns, data))
+            if len(sent) % 400 == 0:
+                time.sleep(0.25)  # several chunks
+    assert (log.failed, log.dropped, log.written) == ("", 0, len(sent))
+    return path, sent
+
+
+def flattened(message, prefix=""):
+    """Values of a ROS message by the names that a log gives them."""
+    for name, kind in message.get_fields_and_field_types().items():
+        value, full = getattr(message, name), prefix + name
+        if hasattr(value, "get_fields_and_field_types"):
+            yield from flattened(value, f"{full}.")
+        elif kind.startswith("sequence") and "/" in kind:
+            for index, item in enumerate(value):
+                yield from flattened(item, f"{full}[{index}].")
+        elif isinstance(value, bytes):  # what rclpy makes of the type byte
+            yield full, value[0]
+        else:
+            yield full, value
+
+
+# -- definitions -------------------------------------------------------------------------------------
+
+
+def test_the_definition_of_a_type_holds_all_types_in_it_once(ros):
+    text = ros.definition("sbs_msgs/msg/BodyState")
+    first, *others = text.split("\n" + "=" * 80 + "\n")
+    assert first == ros.find_file("sbs_msgs", "msg/BodyState.msg").read_text()
+    names = [other.partition("\n")[0] for other in others]
+    assert names == [
+        "MSG: geometry_msgs/Point",
+        "MSG: geometry_msgs/Quaternion",
+        "MSG: geometry_msgs/Vector3",
+        "MSG: std_msgs/Header",
+        "MSG: builtin_interfaces/Time",
+    ]
+    assert others[0].partition("\n")[2] == ros.find_file("geometry_msgs", "msg/Point.msg").read_text()
+
+
+@pytest.mark.parametrize("name", [*TYPES.values(), "sbs_msgs/msg/SwashplateArray"])
+def test_definitions_are_read_as_ros_reads_them(ros, name):
+    definitions = parse(name, ros.definition(name))
+    for short, fields in definitions.items():
+        package, kind = short.split("/")
+        expected = ros.kind(f"{package}/msg/{kind}").get_fields_and_field_types()
+        assert [field.name for field in fields] == list(expected)
+        for field, said in zip(fields, expected.values(), strict=True):
+            base = {"float64": "double", "float32": "float", "bool": "boolean", "byte": "octet"}.get(
+                field.type, field.type
+            )
+            count = {None: base, SEQUENCE: f"sequence<{base}>"}.get(field.count, f"{base}[{field.count}]")
+            assert said == count
+
+
+def test_what_is_not_a_message_type_is_refused_in_one_line(ros, tmp_path):
+    with pytest.raises(RecordingError, match=r"message type 'Controls': allowed is package/msg/Type"):
+        ros.definition("Controls")
+    with pytest.raises(RecordingError, match=r"no definition of message type sbs_msgs/Nothing: .*No such file"):
+        ros.definition("sbs_msgs/msg/Nothing")
+    with pytest.raises(RecordingError, match="no definition of message type no_msgs/Nothing: "):
+        ros.definition("no_msgs/msg/Nothing")
+
+
+def test_fields_and_units_of_a_definition():
+    text = textwrap.dedent("""\
+        # About it all [not a unit of what follows].
+
+        uint8 ON=1  # [s]
+        string NAME="# [kg]"
+        # Several lines [m/s],
+        # of which the first unit counts [ft/s].
+        float64 speed
+        int32 count 3   # [-]
+        string<=5 text
+        float32[<=4] some  # [N m], in [0, 1)
+        other_msgs/Pair[2] pairs
+        # An index as in c[36].
+        Own[] own
+        """)
+    fields = fields_of(text, "a_msgs")
+    assert [(field.name, field.type, field.count, field.units[:1]) for field in fields] == [
+        ("speed", "float64", None, ("m/s",)),
+        ("count", "int32", None, ("-",)),
+        ("text", "string", None, ()),
+        ("some", "float32", SEQUENCE, ("N m",)),
+        ("pairs", "other_msgs/Pair", 2, ()),
+        ("own", "a_msgs/Own", SEQUENCE, ()),
+    ]
+
+
+def test_units_come_from_the_field_or_from_the_field_that_holds_it(ros):
+    def units(name):
+        return Units(parse(name, ros.definition(name)), short_name(name))
+
+    state, rotors = units(TYPES["/state"]), units(TYPES["/rotors"])
+    assert [
+        state[name] for name in ("position.x", "attitude.w", "velocity.z", "acceleration.y", "header.frame_id")
+    ] == [
+        "m",
+        "-",
+        "m/s",
+        "m/s^2",
+        "",
+    ]
+    assert (state["header.stamp.sec"], state["header.stamp.nanosec"]) == ("s", "ns")
+    assert [rotors[f"rotors[1].{name}"] for name in ("flap", "lag_rate", "thrust", "hub.force.x", "hub.torque.z")] == [
+        "rad",
+        "rad/s",
+        "N",
+        "N",
+        "N m",
+    ]
+    assert units(TYPES["/inflow"])["rotors[0].uniform"] == "-"
+    assert units("sbs_msgs/msg/SwashplateArray")["rotors[0].collective"] == "rad"
+    assert units(TYPES["/odom"])["pose.pose.position.x"] == ""
+
+
+# -- other people's readers --------------------------------------------------------------------------
+
+
+def test_rosbags_reads_every_message(flight, ros):
+    highlevel = pytest.importorskip("rosbags.highlevel")
+    path, sent = flight
+    with highlevel.AnyReader([path]) as reader:
+        assert {topic: info.msgtype for topic, info in reader.topics.items()} == TYPES
+        qos = reader.topics["/state"].connections[0].ext.offered_qos_profiles
+        assert [(item.reliability.name, item.durability.name, item.depth) for item in qos] == [
+            ("RELIABLE", "VOLATILE", 10)
+        ]
+        found = [
+            (connection.topic, time_ns, data, reader.deserialize(data, connection.msgtype))
+            for connection, time_ns, data in reader.messages()
+        ]
+    # equal times come in any order
+    assert sorted(item[:3] for item in found) == sorted(sent)
+    for topic, _, data, message in found:
+        for name, value in flattened(ros.deserialize(data, TYPES[topic])):
+            other = eval(f"message.{name}", {"message": message})
+            np.testing.assert_array_equal(other, value, err_msg=f"{topic} {name}")
+
+
+def test_mcap_reads_every_message(flight, ros):
+    from mcap_ros2.decoder import DecoderFactory
+
+    path, sent = flight
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        found = list(reader.iter_decoded_messages())
+        assert (reader.get_header().profile, reader.get_header().library) == ("ros2", "test 1")
+        assert [(item.name, item.data) for item in reader.iter_attachments()] == [
+            ("sbs.yaml", b"mass: 1\n"),
+            ("empty", b""),
+        ]
+        statistics = reader.get_summary().statistics
+    assert statistics.message_count == len(sent)
+    assert (statistics.message_start_time, statistics.message_end_time) == (10_000_000, TICKS * 10_000_000)
+    assert sorted((item.channel.topic, item.message.log_time, item.message.data) for item in found) == sorted(sent)
+    for item in found:
+        for name, value in flattened(ros.deserialize(item.message.data, item.schema.name)):
+            other = eval(f"message.{name}", {"message": item.decoded_message})
+            np.testing.assert_array_equal(other, value, err_msg=f"{item.channel.topic} {name}")
+
+
+def test_the_package_that_reads_from_start_to_end_agrees_with_every_checksum(flight):
+    from mcap.stream_reader import StreamReader
+
+    path, sent = flight
+    with path.open("rb") as file:
+        records = list(StreamReader(file, validate_crcs=True).records)
+    assert sum(type(record).__name__ == "Message" for record in records) == len(sent)
+
+
+def test_rosbag2_finds_its_metadata(flight):
+    path, sent = flight
+    with path.open("rb") as file:
+        records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    bag = YAML(typ="safe").load(records["rosbag2"]["serialized_metadata"])
+    keys = "version storage_identifier duration starting_time message_count topics_with_message_count"
+    keys += " compression_format compression_mode relative_file_paths files custom_data ros_distro"
+    assert list(bag) == keys.split()
+    assert (bag["version"], bag["storage_identifier"], bag["ros_distro"]) == (9, "mcap", "jazzy")
+    assert bag["message_count"] == len(sent)
+    assert bag["files"][0]["path"] == bag["relative_file_paths"][0] == path.name
+    topics = {item["topic_metadata"]["name"]: item for item in bag["topics_with_message_count"]}
+    assert {name: item["topic_metadata"]["type"] for name, item in topics.items()} == TYPES
+    profile = topics["/state"]["topic_metadata"]["offered_qos_profiles"][0]
+    assert profile["deadline"] == {"sec": 9223372036, "nsec": 854775807}
+    assert topics["/state"]["message_count"] == TICKS
+    assert topics["/never"]["message_count"] == 0
+
+
+# -- reading -----------------------------------------------------------------------------------------
+
+
+def test_a_log_has_every_value(flight, ros):
+    path, sent = flight
+    log = read(path)
+    assert (log.complete, log.reasons) == (True, ())
+    assert log.topics == tuple(TYPES)
+    for topic in TYPES:
+        messages = [(time_ns, ros.deserialize(data, TYPES[topic])) for name, time_ns, data in sent if name == topic]
+        assert log[topic].type == TYPES[topic]
+        assert log[topic].time_ns.tolist() == [time_ns for time_ns, _ in messages]
+        np.testing.assert_allclose(log[topic].time, [time_ns / 1e9 for time_ns, _ in messages])
+        seen = set()
+        for row, (_, message) in enumerate(messages):
+            for name, value in flattened(message):
+                np.testing.assert_array_equal(log[topic][name][row], value, err_msg=f"{topic} {name}")
+                seen.add(name)
+        assert seen == set(log[topic]) or not messages
+
+
+def test_a_log_has_the_shapes_and_types_of_the_fields(flight):
+    log = read(flight[0])
+    assert log["rotors"]["rotors[0].flap"].shape == (TICKS, 3)
+    assert log["odom"]["pose.covariance"].shape == (TICKS, 36)
+    assert log["state"]["position.x"].dtype == np.float64
+    assert log["status"]["steps"].dtype == np.uint64
+    assert log["status"]["fault"].tolist() == [""] * (TICKS - 3) + ["step 7: höher als plausibel"] * 3
+    assert list(log["state"])[:4] == ["header.stamp.sec", "header.stamp.nanosec", "header.frame_id", "position.x"]
+    assert log["state"].units["position.x"] == "m"
+    assert set(log["rotors"].units) == set(log["rotors"])
+    # what was never sent has no values, but the fields that it must have
+    assert log["never"]["collective"].shape == (0,)
+    assert "/state" in log
+    assert "state" in log
+    assert "speed" not in log
+
+
+def test_a_log_has_metadata_and_attachments(flight):
+    log = read(flight[0])
+    assert log.metadata["aircraft"] == {"name": "sbs", "städte": "ü"}
+    assert log.metadata["recording"]["library"] == "test 1"
+    assert log.metadata["recording"]["wall_start"] == "2023-11-14T22:13:20.123+00:00"
+    assert log.wall_start_ns == 1_700_000_000_123_456_789
+    assert log.metadata["recording_end"]["dropped"] == "0"
+    assert log.attachments == {"sbs.yaml": b"mass: 1\n", "empty": b""}
+
+
+def test_what_a_log_has_not_is_told_with_what_it_has(flight):
+    log = read(flight[0])
+    with pytest.raises(KeyError, match=r"no topic 'speed'; there are /state, /rotors"):
+        log["speed"]
+    with pytest.raises(KeyError, match=r"topic /state has no field 'x'; there are header.stamp.sec, "):
+        log["state"]["x"]
+    assert repr(log["state"]) == "<topic /state: 250 messages of type sbs_msgs/msg/BodyState>"
+    assert repr(log).startswith("<complete recording ")
+
+
+@pytest.mark.parametrize("topic", [topic for topic in TYPES if topic != "/never"])
+def test_both_ways_of_decoding_agree(flight, ros, topic):
+    """Message by message with mcap_ros2, and all at once where the layout is constant."""
+    name = TYPES[topic]
+    text = ros.definition(name)
+    messages = [data for other, _, data in flight[1] if other == topic]
+    definitions, schema = parse(name, text), Schema(1, text.encode(), "ros2msg", name)
+    slow = decode_one_by_one(schema, definitions, short_name(name), messages)
+    fast = Layout(definitions, short_name(name), messages[0]).decode(messages)
+    if topic in ("/status", "/diagnostics"):
+        assert fast is None
+        fast = decode(schema, definitions, short_name(name), messages)
+    assert list(fast) == list(slow)
+    for field, values in fast.items():
+        assert values.dtype == slow[field].dtype, field
+        np.testing.assert_array_equal(values, slow[field], err_msg=field)
+
+
+MIXED = textwrap.dedent("""\
+    bool flag
+    float64 first
+    uint8 small
+    int16[3] fixed
+    string text
+    float64[] many
+    bool[] flags
+    Pair[] pairs
+    Pair pair
+    string[] texts
+    uint8[] bytes
+    int8 tiny
+    uint64 last
+    ================================================================================
+    MSG: test_msgs/Pair
+    int8 a
+    float32 b
+    """)
+MIXED_TYPE = "test_msgs/msg/Mixed"
+
+
+def mixed_values(chance, lengths):
+    """A message with lists and texts of the given lengths."""
+    text, many, flags, pairs, texts, data = lengths
+    pair = {"a": chance.randrange(-128, 128), "b": float(np.float32(chance.random()))}
+    return {
+        "flag": chance.random() < 0.5,
+        "first": chance.random(),
+        "small": chance.randrange(256),
+        "fixed": [chance.randrange(-9, 9) for _ in range(3)],
+        "text": "".join(chance.choices("abc", k=text)),
+        "many": [chance.random() for _ in range(many)],
+        "flags": [chance.random() < 0.5 for _ in range(flags)],
+        "pairs": [dict(pair) for _ in range(pairs)],
+        "pair": pair,
+        "texts": ["".join(chance.choices("xyz", k=number)) for number in range(texts)],
+        "bytes": list(chance.randbytes(data)),
+        "tiny": chance.randrange(-128, 128),
+        "last": chance.randrange(2**64),
+    }
+
+
+@given(
+    st.lists(st.integers(0, 4), min_size=6, max_size=6),
+    st.lists(st.integers(0, 4), min_size=6, max_size=6),
+    st.booleans(),
+    st.integers(0, 2**32),
+)
+@settings(max_examples=150, deadline=None)
+def test_messages_of_any_lengths_are_decoded_alike(lengths, others, constant, seed):
+    from mcap_ros2._dynamic import serialize_dynamic
+
+    chance = random.Random(seed)
+    encode = serialize_dynamic(MIXED_TYPE, MIXED)[MIXED_TYPE]
+    rows = [mixed_values(chance, lengths if constant or chance.random() < 0.5 else others) for _ in range(4)]
+    messages = [encode(row) for row in rows]
+    definitions, schema = parse(MIXED_TYPE, MIXED), Schema(1, MIXED.encode(), "ros2msg", MIXED_TYPE)
+    columns = decode(schema, definitions, "test_msgs/Mixed", messages)
+    slow = decode_one_by_one(schema, definitions, "test_msgs/Mixed", messages)
+    assert list(columns) == list(slow)
+    for row, values in enumerate(rows):
+        for name in ("flag", "first", "small", "fixed", "text", "many", "flags", "texts", "bytes", "tiny", "last"):
+            assert np.array_equal(columns[name][row], values[name]), name
+            assert np.array_equal(slow[name][row], values[name]), name
+        for number, pair in enumerate(values["pairs"]):
+            assert columns[f"pairs[{number}].a"][row] == pair["a"]
+            assert columns[f"pairs[{number}].b"][row] == np.float32(pair["b"])
+    if constant:
+        assert Layout(definitions, "test_msgs/Mixed", messages[0]).decode(messages) is not None
+
+
+def test_the_layout_is_that_of_fast_dds(ros):
+    """Alignment, lists without values and messages without fields, written by rclpy."""
+    from diagnostic_msgs.msg import KeyValue
+    from geometry_msgs.msg import Inertia, PolygonStamped
+    from std_msgs.msg import Bool, ByteMultiArray, Empty, Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+    dimension = MultiArrayDimension(label="abc", size=2, stride=3)
+    samples = [
+        Bool(data=True),
+        Empty(),
+        KeyValue(key="a", value=""),
+        Inertia(m=2.0, ixx=5.0),
+        PolygonStamped(),
+        Float64MultiArray(data=[1.0, 2.0, 3.0], layout=MultiArrayLayout(dim=[dimension, dimension], data_offset=7)),
+        Float64MultiArray(),
+        ByteMultiArray(data=[b"\x01", b"\xff"]),
+    ]
+    for sample in samples:
+        name = f"{type(sample).__module__.split('.')[0]}/msg/{type(sample).__name__}"
+        definitions = parse(name, ros.definition(name))
+        messages = [ros.serialize(sample)] * 2
+        columns = Layout(definitions, short_name(name), messages[0]).decode(messages)
+        assert columns is not None
+        expected = dict(flattened(sample))
+        if name == "std_msgs/msg/ByteMultiArray":
+            expected["data"] = [1, 255]
+        expected.pop("structure_needs_at_least_one_member", None)
+        for field, values in columns.items():
+            np.testing.assert_array_equal(values[1], expected.get(field, []), err_msg=field)
+        assert {field for field, value in expected.items() if np.size(value)} <= set(columns)
+
+
+def test_the_other_byte_order_is_read_too():
+    definitions = parse("test_msgs/msg/Number", NUMBER)
+    message = struct.pack(">4Bd", 0, 0, 0, 0, 2.5)
+    columns = Layout(definitions, "test_msgs/Number", message).decode([message])
+    assert columns["value"].tolist() == [2.5]
+    assert columns["value"].dtype == np.dtype(np.float64)
+    assert Layout(definitions, "test_msgs/Number", message).decode([message, number_message(2.5)]) is None
+
+
+@pytest.mark.parametrize(
+    ("data", "text", "complaint"),
+    [
+        (number_message(1.0) + bytes(8), NUMBER, "a message of 20 bytes does not agree with the definition"),
+        (number_message(0.1), "float64[] values", "cannot hold 2576980378 values"),
+        (number_message(1.0), "string a\nstring b", "cannot hold 1072693248 values"),
+        (b"\0\1\0\0" + bytes(4), "string a\nstring b", "a message ends before its field b"),
+        (number_message(1.0), "wstring text", "text: values of type wstring cannot be read"),
+        (number_message(1.0), "Other text", "there is no definition of test_msgs/Other"),
+        (b"\0\7\0\0" + bytes(8), NUMBER, "messages in plain CDR can be read, this one begins 00 07 00 00"),
+        (b"", NUMBER, "this one begins $"),
+    ],
+)
+def test_messages_that_are_not_what_they_should_be(tmp_path, data, text, complaint):
+    path = tmp_path / "log.mcap"
+    with new_log(path) as log:
+        log.write(log.add_channel("/odd", "test_msgs/msg/Odd", text, ""), 0, data)
+    topic = read(path)["odd"]
+    with pytest.raises(RecordingError, match=f"^topic /odd: .*({complaint})"):
+        topic["value"]
+
+
+def test_pandas_is_asked_for_politely(flight, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(RecordingError, match="to_pandas needs pandas: python3 -m pip install pandas"):
+        read(flight[0])["state"].to_pandas()
+
+
+def test_a_pandas_frame_has_a_column_for_every_place_of_a_list(flight, monkeypatch):
+    """With a stand-in for pandas, which is no part of the environment."""
+    stand_in = types.ModuleType("pandas")
+    stand_in.Index = lambda values, name: (name, values)
+    stand_in.DataFrame = lambda columns, index: (columns, index)
+    monkeypatch.setitem(sys.modules, "pandas", stand_in)
+    topic = read(flight[0])["rotors"]
+    columns, (name, index) = topic.to_pandas()
+    assert name == "time"
+    np.testing.assert_array_equal(index, topic.time)
+    np.testing.assert_array_equal(columns["rotors[0].flap[2]"], topic["rotors[0].flap"][:, 2])
+    np.testing.assert_array_equal(columns["rotors[1].thrust"], topic["rotors[1].thrust"])
+    assert all(values.shape == (TICKS,) for values in columns.values())
+
+
+def test_files_of_other_writers_are_read(tmp_path):
+    """Of the package's own writer, which has no checksum of the whole."""
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=1000)
+        writer.start(profile="ros2", library="other")
+        schema = writer.register_schema("test_msgs/msg/Number", "ros2msg", NUMBER.encode())
+        channel = writer.register_channel("/number", "cdr", schema)
+        for number in range(200):
+            writer.add_message(channel, number, number_message(number), number)
+        writer.finish()
+    log = read(path)
+    assert (log.complete, log.reasons) == (True, ())
+    assert log["number"]["value"].tolist() == list(range(200))
+    assert recover(path, tmp_path / "new.mcap").messages == 200
+
+
+def test_a_file_without_checksums_is_not_trusted(tmp_path):
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, enable_crcs=False)
+        writer.start(profile="ros2", library="other")
+        schema = writer.register_schema("test_msgs/msg/Number", "ros2msg", NUMBER.encode())
+        writer.add_message(writer.register_channel("/number", "cdr", schema), 1, number_message(1), 1)
+        writer.finish()
+    with pytest.raises(RecordingError, match=r"nothing in .* can be read: .* a chunk has no checksum to trust"):
+        read(path)
+
+
+def test_messages_outside_of_chunks_have_no_checksum_to_trust(tmp_path):
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start(profile="ros2", library="other")
+        schema = writer.register_schema("test_msgs/msg/Number", "ros2msg", NUMBER.encode())
+        channel = writer.register_channel("/number", "cdr", schema)
+        for number in range(1000):
+            writer.add_message(channel, number, number_message(number), number)
+        writer.finish()
+    with Source(path) as source:
+        found = scan(source, lambda content: None)
+    assert not found.complete
+    assert len(found.reasons) == 101
+    assert found.reasons[-1] == "900 more places like these"
+    with pytest.raises(RecordingError, match=r"nothing in .* can be read: .* a message without a checksum"):
+        read(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"no recording\n" * 1000, bytes(5000)])
+def test_what_is_no_recording_is_refused_in_one_line(tmp_path, content):
+    path, output = tmp_path / "file.mcap", tmp_path / "output.mcap"
+    path.write_bytes(content)
+    for use in (lambda: read(path), lambda: recover(path, output)):
+        with pytest.raises(RecordingError, match=rf"^nothing in {path} can be read: no chunk of it is whole: [^\n]+$"):
+            use()
+    assert not output.exists()
+
+
+def test_what_cannot_be_opened_is_refused_in_one_line(tmp_path):
+    with pytest.raises(RecordingError, match=r"cannot read .*nothing.mcap: No such file or directory$"):
+        read(tmp_path / "nothing.mcap")
+    with pytest.raises(RecordingError, match=r"cannot read .*: Is a directory$"):
+        read(tmp_path)
+
+
+# -- writing -----------------------------------------------------------------------------------------
+
+
+def test_few_messages_reach_the_file_in_time(tmp_path):
+    """A slow flight fills no chunks: they are closed by time."""
+    path = tmp_path / "log.mcap"
+    log = new_log(path)
+    channel = add_number(log)
+    for number in range(5):
+        log.write(channel, number, number_message(number))
+        time.sleep(0.45)
+        found = read(path)
+        assert found["number"]["value"].tolist() == list(range(number + 1))
+        assert not found.complete
+        assert found.reasons == ("the recording was not closed: it has no end",)
+    assert log.close()
+    assert read(path).complete
+
+
+def test_many_messages_are_put_into_chunks_of_a_handy_size(tmp_path):
+    path = tmp_path / "log.mcap"
+    with new_log(path) as log:
+        channel = log.add_channel("/noise", "test_msgs/msg/Noise", "uint8[] data", "")
+        for number in range(3000):
+            log.write(channel, number, struct.pack("<4BI", 0, 1, 0, 0, 1000) + os.urandom(1000), wait=True)
+    with path.open("rb") as file:
+        chunks = make_reader(file).get_summary().chunk_indexes
+    assert len(chunks) >= 10
+    assert max(chunk.uncompressed_size for chunk in chunks) < CHUNK_SIZE * 1.2
+    assert read(path)["noise"]["data"].shape == (3000, 1000)
+
+
+class SlowDisk:
+    """Makes every write after the first wait until it is told to go on."""
+
+    def __init__(self, monkeypatch):
+        self.go_on = threading.Event()
+        self.waiting = threading.Event()
+        write = NewFile.write
+
+        def slow(file, data):
+            if file._size:
+                self.waiting.set()
+                self.go_on.wait(60)
+            write(file, data)
+
+        monkeypatch.setattr(NewFile, "write", slow)
+
+
+def test_a_slow_disk_never_blocks_and_what_is_dropped_is_counted(tmp_path, monkeypatch):
+    disk = SlowDisk(monkeypatch)
+    log = new_log(tmp_path / "log.mcap", queue_length=100)
+    channel = add_number(log)
+    assert log.write(channel, 0, number_message(0))
+    assert disk.waiting.wait(10)
+    begun = time.monotonic()
+    taken = [log.write(channel, number, number_message(number)) for number in range(1, 301)]
+    assert time.monotonic() - begun < 1.0
+    assert taken == [True] * 100 + [False] * 200
+    assert (log.dropped, log.written) == (200, 0)
+    disk.go_on.set()
+    assert log.close()
+    assert (log.dropped, log.written) == (200, 101)
+    found = read(log.path)
+    assert found["number"]["value"].tolist() == list(range(101))
+    assert found.metadata["recording_end"] == {"written": "101", "dropped": "200"}
+
+
+def test_a_patient_writer_waits_for_room(tmp_path, monkeypatch):
+    disk = SlowDisk(monkeypatch)
+    log = new_log(tmp_path / "log.mcap", queue_length=10)
+    channel = add_number(log)
+    results = []
+
+    def write_many():
+        results.extend(log.write(channel, number, number_message(number), wait=True) for number in range(200))
+
+    thread = threading.Thread(target=write_many)
+    thread.start()
+    assert disk.waiting.wait(10)
+    time.sleep(0.2)
+    assert thread.is_alive()
+    assert len(results) <= 20  # ten in the queue, up to ten in the hands of the disk
+    disk.go_on.set()
+    thread.join(30)
+    assert log.close()
+    assert results == [True] * 200
+    assert read(log.path)["number"]["value"].tolist() == list(range(200))
+
+
+def test_a_patient_writer_is_let_go_at_the_end(tmp_path, monkeypatch):
+    disk = SlowDisk(monkeypatch)
+    log = new_log(tmp_path / "log.mcap", queue_length=1)
+    channel = add_number(log)
+    results = []
+
+    def write_many():
+        results.extend(log.write(channel, number, number_message(number), wait=True) for number in range(5))
+
+    thread = threading.Thread(target=write_many)
+    thread.start()
+    assert disk.waiting.wait(10)
+    time.sleep(0.1)
+    assert not log.close(timeout=0.1)
+    thread.join(10)
+    assert not thread.is_alive()
+    assert results.count(True) == 2
+    assert log.dropped == 3
+    assert "the disk did not take the rest within 0.1 s" in log.failed
+    disk.go_on.set()
+    assert not log.close()  # but it did in the end
+    assert read(log.path).complete
+
+
+def test_a_gap_in_the_sequence_tells_of_dropped_messages(tmp_path, monkeypatch):
+    disk = SlowDisk(monkeypatch)
+    log = new_log(tmp_path / "log.mcap", queue_length=5)
+    channel = add_number(log)
+    log.write(channel, 0, number_message(0))
+    assert disk.waiting.wait(10)
+    for number in range(1, 9):
+        log.write(channel, number, number_message(number))
+    disk.go_on.set()
+    wait_until(lambda: log.written == 6)
+    log.write(channel, 9, number_message(9))
+    assert log.close()
+    assert sorted(sequence for _, sequence in crash.messages_of(log.path)) == [1, 2, 3, 4, 5, 6, 10]
+
+
+def test_several_threads_write(tmp_path):
+    log = new_log(tmp_path / "log.mcap")
+    channels = [add_number(log, f"/number{index}") for index in range(4)]
+
+    def write_many(channel):
+        for number in range(2000):
+            log.write(channel, number, number_message(number), wait=True)
+
+    threads = [threading.Thread(target=write_many, args=(channel,)) for channel in channels]
+    for thread in threads:
+        thread.start()
+    added = [add_number(log, f"/late{index}") for index in range(20)]
+    for thread in threads:
+        thread.join()
+    for channel in added:
+        log.write(channel, 1, number_message(1))
+    assert log.close()
+    found = read(log.path)
+    assert found.complete
+    for index in range(4):
+        assert found[f"number{index}"]["value"].tolist() == list(range(2000))
+    assert all(found[f"late{index}"]["value"].tolist() == [1] for index in range(20))
+
+
+def test_after_the_end_everything_is_dropped(tmp_path):
+    log = new_log(tmp_path / "log.mcap")
+    channel = add_number(log)
+    assert log.close()
+    assert log.close()
+    assert not log.write(channel, 0, number_message(0))
+    assert not log.write(channel, 0, number_message(0), wait=True)
+    assert (log.written, log.dropped, log.failed) == (0, 2, "")
+    found = read(log.path)
+    assert found.complete
+    assert found["number"].time.shape == (0,)
+
+
+def test_what_cannot_be_recorded_is_refused(tmp_path):
+    with new_log(tmp_path / "log.mcap") as log:
+        channel = add_number(log)
+        with pytest.raises(RecordingError, match="topic /number is recorded already"):
+            add_number(log)
+        with pytest.raises(
+            RecordingError, match="topic /other: test_msgs/msg/Number is recorded with another definition"
+        ):
+            log.add_channel("/other", "test_msgs/msg/Number", "int8 value", "")
+        with pytest.raises(RecordingError, match="topic /other: the QoS profiles are not a YAML list: 'depth: 1'"):
+            log.add_channel("/other", "test_msgs/msg/Number", NUMBER, "depth: 1")
+        with pytest.raises(RecordingError, match="channel 7: allowed are those that add_channel gave"):
+            log.write(7, 0, b"")
+        with pytest.raises(RecordingError, match="log time -1 ns: allowed are 0 to"):
+            log.write(channel, -1, b"")
+        assert log.write(channel, 2**63 - 1, number_message(1))
+    assert (log.written, log.dropped) == (1, 0)
+    for data in ({"rosbag2": {}}, {"recording": {}}, {"mine": {"crc32": ""}}):
+        with pytest.raises(RecordingError, match=r"metadata '\w+': reserved are recording, "):
+            new_log(tmp_path / "other.mcap", metadata=data)
+    assert not (tmp_path / "other.mcap").exists()
+
+
+def test_an_error_of_ours_ends_the_recording_and_not_the_flight(tmp_path):
+    log = new_log(tmp_path / "log.mcap")
+    channel = add_number(log)
+    log.write(channel, 0, number_message(0))
+    wait_until(lambda: log.written)
+    log.write(channel, 1, ["no bytes"])
+    wait_until(lambda: log.failed)
+    assert "internal error: TypeError" in log.failed
+    assert not log.write(channel, 2, number_message(2))
+    assert not log.close()
+    assert (log.written, log.dropped) == (1, 2)
+    assert read(log.path)["number"]["value"].tolist() == [0]
+
+
+def test_where_no_file_can_be_made_one_line_says_why(tmp_path):
+    with pytest.raises(RecordingError, match=r"cannot write .*/no/log.mcap: the folder .*/no does not exist$"):
+        new_log(tmp_path / "no" / "log.mcap")
+    (tmp_path / "log.mcap").write_text("mine")
+    with pytest.raises(RecordingError, match=r"cannot write .*log.mcap: File exists$"):
+        new_log(tmp_path / "log.mcap")
+    assert (tmp_path / "log.mcap").read_text() == "mine"
+    with pytest.raises(RecordingError, match=r"cannot write .*: Not a directory$"):
+        new_log(tmp_path / "log.mcap" / "log.mcap")
+    with pytest.raises(RecordingError, match=r"cannot write .*: embedded null byte$"):
+        new_log(tmp_path / "a\0b")
+
+
+def test_a_folder_that_must_not_be_written(tmp_path):
+    tmp_path.chmod(0o555)
+    user = os.geteuid()
+    try:
+        if user == 0:  # who may write everywhere
+            os.seteuid(65534)
+        with pytest.raises(RecordingError, match=r"cannot write .*log.mcap: Permission denied$"):
+            new_log(tmp_path / "log.mcap")
+    finally:
+        os.seteuid(user)
+        tmp_path.chmod(0o755)
+
+
+FULL_DISK = """
+    import os, resource, struct, sys, time
+    from sbs_sim.recording import LogWriter
+    limit = int(sys.argv[2])
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    log = LogWriter(sys.argv[1], library="test", wall_start=0, attachments={"file": b"x" * 1000})
+    channel = log.add_channel("/noise", "test_msgs/msg/Noise", "uint8[] data", "")
+    message = struct.pack("<4BI", 0, 1, 0, 0, 1000)
+    for number in range(1000):
+        log.write(channel, number, message + os.urandom(1000))
+        time.sleep(0.001)
+    last = log.write(channel, 1000, message)
+    closed = log.close()
+    print(log.written, log.dropped, last, closed, log.failed)
+"""
+
+
+def test_a_full_disk_ends_the_recording_and_not_the_flight(tmp_path):
+    path = tmp_path / "log.mcap"
+    code = [sys.executable, "-c", textwrap.dedent(FULL_DISK), str(path)]
+    result = subprocess.run([*code, "500000"], capture_output=True, text=True, timeout=60, check=True)
+    written, dropped, last, closed, failed = result.stdout.strip().split(maxsplit=4)
+    assert int(written) + int(dropped) == 1001
+    assert 100 < int(written) < 500
+    assert (last, closed) == ("False", "False")
+    assert failed == f"cannot write {path}: File too large"
+    found = read(path)
+    assert found["noise"]["data"].shape == (int(written), 1000)
+    assert found.reasons == ("the recording was not closed: it has no end",)
+
+
+def test_a_disk_that_is_full_already(tmp_path):
+    path = tmp_path / "log.mcap"
+    code = [sys.executable, "-c", textwrap.dedent(FULL_DISK), str(path), "500"]
+    result = subprocess.run(code, capture_output=True, text=True, timeout=60, check=False)
+    assert f"RecordingError: cannot write {path}: File too large" in result.stderr
+    assert not path.exists()
+
+
+def test_the_summary_of_a_full_disk(tmp_path, monkeypatch):
+    """Room for every chunk, but not for the end."""
+    log = new_log(tmp_path / "log.mcap")
+    log.write(add_number(log), 0, number_message(0))
+    wait_until(lambda: log.written)
+    size = log.path.stat().st_size
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size + 50, limits[1]))
+    try:
+        assert not log.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert log.failed.endswith("File too large")
+    assert log.path.stat().st_size == size
+    assert read(log.path)["number"]["value"].tolist() == [0]
+
+
+def test_a_writer_needs_neither_numpy_nor_ros():
+    code = "import sys; from sbs_sim.recording import LogWriter; print({'numpy', 'rclpy'} & set(sys.modules))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert result.stdout.strip() == "set()"
+
+
+def test_a_missing_package_is_named_with_its_remedy():
+    code = "import sys; sys.modules['mcap'] = None; import sbs_sim.recording; sbs_sim.recording.read"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert "RecordingError: the Python package mcap is missing: python3 -m pip install mcap" in result.stderr
+
+
+# -- killing, cutting, damaging ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tick", crash.TICKS[1:])
+def test_a_killed_recorder_loses_half_a_second_at_most(tmp_path, tick):
+    loss = crash.kill_one(tmp_path / "log.mcap", tick, random.Random().uniform(0.6, 1.5))
+    assert loss is not None
+    assert loss < crash.ALLOWED_LOSS
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory):
+    return crash.make_original(tmp_path_factory.mktemp("original"), seconds=2.0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("damaged")
+
+
+@given(st.sampled_from(crash.KINDS), st.integers(0, 2**32))
+@settings(max_examples=200, deadline=None)
+def test_damage_costs_no_more_than_what_it_touches(original, folder, kind, seed):
+    crash.damage_one(folder, original, kind(original.data, random.Random(seed)))
+
+
+@given(st.data(), st.integers(2, 6))
+@settings(max_examples=60, deadline=None)
+def test_several_damages_never_yield_what_was_not_recorded(original, folder, data, count):
+    damaged = original.data
+    for _ in range(count):
+        damaged = data.draw(st.sampled_from(crash.KINDS[1:]))(damaged, random.Random(data.draw(st.integers(0, 99999))))[
+            0
+        ]
+    crash.damage_one(folder, original, (damaged, 0, len(original.data), 0))
+
+
+def test_every_single_byte_of_a_small_file(tmp_path):
+    """Each byte wrong, and the file cut at many places."""
+    path = tmp_path / "log.mcap"
+    with new_log(path, metadata={"mine": {"key": "value"}}, attachments={"file": b"content"}) as log:
+        channel = log.add_channel("/number", "test_msgs/msg/Number", NUMBER, "")
+        for number in range(3):
+            log.write(channel, number, number_message(number))
+    data = path.read_bytes()
+    messages = crash.messages_of(path)
+    whole = read(path)
+    place = data.index(b"\x04\0\0\0zstd") - 37
+    span = (place, place + 9 + struct.unpack_from("<Q", data, place + 1)[0])
+    original = crash.Original(data, messages, {span: set(messages)}, whole.metadata, whole.attachments)
+    for offset in range(len(data)):
+        damaged = data[:offset] + bytes([data[offset] ^ 0xFF]) + data[offset + 1 :]
+        crash.damage_one(tmp_path, original, (damaged, offset, offset + 1, 0))
+        if offset % 3 == 0:
+            crash.damage_one(tmp_path, original, (data[:offset], offset, len(data), 0))
+
+
+def test_lengths_beyond_all_bounds_do_not_take_all_memory(tmp_path, original):
+    """Every length field of the first chunk, claiming gigabytes."""
+    place = min(original.chunks)[0]
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    present = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (present + 8 * LARGEST, limits[1]))
+    try:
+        for field, claim in itertools.product((1, 25, 33, 45), (2**31, 2**40, 2**63, 2**64 - 1)):
+            data = bytearray(original.data)
+            struct.pack_into("<Q", data, place + field, claim)
+            crash.damage_one(tmp_path, original, (bytes(data), place, place + 60, 0))
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
+
+
+def test_damage_to_what_is_not_needed_is_told_and_costs_nothing(tmp_path, original):
+    """The name of the program in the header, and times in a message index."""
+    (_, end), *_ = sorted(original.chunks)
+    for place in (original.data.index(b"crash_recording"), end + 9 + 6 + 3):
+        data = bytearray(original.data)
+        data[place] ^= 1
+        path = tmp_path / "damaged.mcap"
+        path.write_bytes(data)
+        log = read(path)
+        assert log.complete
+        assert log.reasons == ("the checksum of the data is wrong, those of their parts are right",)
+        assert log.metadata == original.metadata
+        crash.damage_one(tmp_path, original, (bytes(data), place, place + 1, 0))
+
+
+def test_the_definitions_survive_the_first_chunk(tmp_path, original):
+    (start, end), *_ = sorted(original.chunks)
+    data = original.data[:start] + bytes(end - start) + original.data[end:-100]
+    path = tmp_path / "damaged.mcap"
+    path.write_bytes(data)
+    assert crash.damage_one(tmp_path, original, (data, start, len(data), 0))[0] == "in part"
+    assert "values" in read(path)["t16"]
+
+
+def test_a_recovered_file_is_whole_and_says_what_it_was(tmp_path, flight):
+    path, sent = flight
+    broken, output = tmp_path / "broken.mcap", tmp_path / "output.mcap"
+    broken.write_bytes(path.read_bytes()[:-50_000])
+    recovery = recover(broken, output)
+    assert not recovery.complete
+    assert 0 < recovery.messages < len(sent)
+    assert recovery.reasons[-1] == "the recording was not closed: it has no end"
+    log = read(output)
+    assert log.complete
+    assert log.metadata["recovery"]["complete"] == "false"
+    assert log.metadata["recovery"]["lost_bytes"] == str(recovery.lost_bytes)
+    assert log.metadata["aircraft"] == {"name": "sbs", "städte": "ü"}
+    assert log.metadata["recording"]["library"] == "test 1"
+    assert recovery.last_time == max(topic.time.max(initial=0.0) for topic in log.values())
+    highlevel = pytest.importorskip("rosbags.highlevel")
+    with highlevel.AnyReader([output]) as reader:
+        assert reader.message_count == recovery.messages
+        found = sorted((connection.topic, time_ns, data) for connection, time_ns, data in reader.messages())
+    assert set(found) <= set(sent)
+
+
+def test_a_whole_file_is_recovered_whole(tmp_path, flight):
+    path, sent = flight
+    before = path.read_bytes()
+    recovery = recover(path, tmp_path / "output.mcap")
+    assert (recovery.messages, recovery.lost_bytes, recovery.complete, recovery.reasons) == (len(sent), 0, True, ())
+    assert recovery.last_time == TICKS * 0.01
+    assert path.read_bytes() == before
+    again = recover(tmp_path / "output.mcap", tmp_path / "again.mcap")
+    assert again == recovery
+
+
+def test_an_output_that_exists_is_left_alone(tmp_path, flight):
+    path, _ = flight
+    with pytest.raises(RecordingError, match=r"cannot write .*: File exists"):
+        recover(path, path)
+    with pytest.raises(RecordingError, match=r"cannot write .*: the folder .* does not exist"):
+        recover(path, tmp_path / "no" / "output.mcap")
+
+
+def test_an_output_that_is_not_what_was_written_is_not_left(tmp_path, flight, monkeypatch):
+    write = NewFile.write
+    monkeypatch.setattr(NewFile, "write", lambda file, data: write(file, data.replace(b"zstd", b"zzzz", 1)))
+    with pytest.raises(RecordingError, match=r"cannot write .*: what was read back is not what was written"):
+        recover(flight[0], tmp_path / "output.mcap")
+    assert not (tmp_path / "output.mcap").exists()
+
+
+def test_a_scan_hands_out_nothing_without_a_checksum(original, tmp_path):
+    """The content of a chunk that still decompresses, with its checksum wrong."""
+    data = bytearray(original.data)
+    for start, _ in original.chunks:
+        data[start + 33] ^= 1
+    path = tmp_path / "damaged.mcap"
+    path.write_bytes(data)
+    contents = []
+    with Source(path) as source:
+        found = scan(source, contents.append)
+    assert contents == []
+    assert not found.complete
+    assert len(found.chunks) == 0

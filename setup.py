@@ -39,10 +39,12 @@ setup(
             "simulator = sbs_sim.nodes.executables:simulator",
             "control_mixer = sbs_sim.nodes.executables:control_mixer",
             "analysis = sbs_sim.nodes.executables:analysis",
+            "replay = sbs_sim.nodes.executables:replay",
             "trim = sbs_sim.commands.trim:main",
             "linearize = sbs_sim.commands.linearize:main",
             "sweep = sbs_sim.commands.sweep:main",
             "reproduce = sbs_sim.commands.reproduce:main",
+            "plot = sbs_sim.commands.plot:main",
         ],
     },
 )

@@ -302,6 +302,22 @@ class Aircraft:
             digest.update(f"{values.shape}{values.dtype.str}".encode() + values.tobytes())
         return digest.hexdigest()
 
+    def files(self) -> tuple[dict[str, Any], dict[str, bytes]]:
+        """Everything that makes this aircraft: its mapping, which names airfoils by file, and those files by name.
+
+        Raises
+        ------
+        AircraftError
+            An airfoil's file is not there any more.
+        """
+        data, contents, names = separate(self.data), {}, {}
+        for i, airfoil in enumerate(sorted(self.airfoils)):
+            names[airfoil] = f"{i}_{Path(airfoil).stem}.csv"
+            contents[names[airfoil]] = _find(airfoil, "airfoils", ".csv", self.folder).read_bytes()
+        for entry in data["rotors"]:
+            entry["airfoil"] = names[entry["airfoil"]]
+        return data, contents
+
     def mix(self, controls: Array) -> Array:
         """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls [rad], shape (4,)."""
         return np.stack([rotor.mixing @ np.asarray(controls, dtype=float) for rotor in self.rotors])

@@ -217,6 +217,16 @@ class FlightLoop:
         return self._simulation.time
 
     @property
+    def step_size(self) -> float:
+        """Integration step [s]."""
+        return self._simulation.step_size
+
+    @property
+    def pace(self) -> float:
+        """Wanted real-time factor; 0 is as fast as reports are taken."""
+        return self._pace
+
+    @property
     def command_timeout(self) -> float:
         """Age at which a command counts as timed out [s]; 0 is never."""
         return self._timeout

@@ -34,7 +34,7 @@ class Mixer:
     """
 
     def __init__(self, aircraft: Aircraft) -> None:
-        self._aircraft = aircraft
+        self.aircraft = aircraft
         ranges = np.array([aircraft.control_ranges[name] for name in CONTROL_NAMES])
         self._low, self._high = ranges.T
         swash = np.array([[r.collective_range, r.cyclic_range, r.cyclic_range] for r in aircraft.rotors])
@@ -61,10 +61,10 @@ class Mixer:
             if not abs(value) <= math.pi / 2:  # true for a NaN as well
                 raise SimulationError(f"{name} = {value}: allowed are -1.5708 to 1.5708 rad")
         clipped = np.clip(values, self._low, self._high)
-        wanted = self._aircraft.mix(clipped)
+        wanted = self.aircraft.mix(clipped)
         self._target = np.clip(wanted, self._swash_low, self._swash_high)
         texts = _clipped(CONTROL_NAMES, values, clipped)
-        for rotor, row, limited in zip(self._aircraft.rotors, wanted, self._target, strict=True):
+        for rotor, row, limited in zip(self.aircraft.rotors, wanted, self._target, strict=True):
             texts += _clipped([f"{rotor.name} {name}" for name in SWASHPLATE_NAMES], row, limited)
         self.saturated = tuple(texts)
 

@@ -145,6 +145,13 @@ class Simulation:
             raise SimulationError(f"azimuth_step = {math.degrees(azimuth_step):g} deg: allowed are 0.01 to 45 deg")
         if method not in METHODS:
             raise SimulationError(f"method = {method!r}: allowed are {', '.join(METHODS)}")
+        self.options: dict[str, Any] = {
+            "tick": tick,
+            "azimuth_step": azimuth_step,
+            "lead_lag": lead_lag,
+            "cyclic_inflow": cyclic_inflow,
+            "method": method,
+        }
         self.aircraft = aircraft
         self.layout = aircraft.layout
         self.tick = tick

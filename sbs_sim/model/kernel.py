@@ -42,9 +42,7 @@ def cache_folder() -> Path:
     numba asks only whether the file of the function itself has changed, not the files of what it calls.
     A folder named after the content of all of them can never hold stale physics.
     """
-    here = Path(__file__).parent
-    sources = sorted(here.glob("*.py"))
-    digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+    here, digest = Path(__file__).parent, source_digest()
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
         return Path(chosen) / "sbs_sim" / f"kernels-{digest}"
@@ -54,6 +52,12 @@ def cache_folder() -> Path:
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     kept = home / "sbs_sim" / f"kernels-{digest}"
     return kept if _writable(kept) else Path(tempfile.gettempdir()) / f"sbs_sim-{os.getuid()}-{digest}"
+
+
+def source_digest() -> str:
+    """Digest of all sources of the compiled model, 16 hexadecimal digits."""
+    sources = sorted(Path(__file__).parent.glob("*.py"))
+    return hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:16]
 
 
 def _writable(folder: Path) -> bool:

@@ -21,8 +21,9 @@ from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.sweep import SweepPoint, sweep
 from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError
+from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.nodes.conversions import model_message, sweep_messages, trim_message
-from sbs_sim.nodes.host import LATCHED_QOS, Component, Parameter, declare, run
+from sbs_sim.nodes.host import LATCHED_QOS, Component, Log, Parameter, Topic, declare, run
 from sbs_sim.nodes.threaded_action import ThreadedActionServer
 
 PARAMETERS = {
@@ -38,20 +39,23 @@ class Analysis(Component):
 
     Parameters
     ----------
-    aircraft : Aircraft, optional
-        The one that flies, if it is in the same process; else a parameter names it.
+    loop : FlightLoop, optional
+        The flight, if it is in the same process: its aircraft is the one; else a parameter names it.
+    log : Log, optional
+        Where results are recorded.
     """
 
-    def __init__(self, aircraft: Aircraft | None = None) -> None:
+    def __init__(self, loop: FlightLoop | None = None, log: Log | None = None) -> None:
         super().__init__("analysis")
-        self._aircraft = Aircraft.load(declare(self, PARAMETERS)["aircraft"]) if aircraft is None else aircraft
-        self._sweep_workers = None if aircraft is None else 1  # the other cores fly
+        self._loop = loop
+        self._aircraft = Aircraft.load(declare(self, PARAMETERS)["aircraft"]) if loop is None else loop.aircraft
+        self._sweep_workers = None if loop is None else 1  # the other cores fly
         self._ending = threading.Event()
         self._turn = threading.Lock()
         with contextlib.suppress(SbsError):  # load now what the first caller would have to wait for
             model_message(self._aircraft, linearize(self._aircraft))
-        self._trim_point = self.create_publisher(TrimPoint, "trim_point", LATCHED_QOS)
-        self._linear_model = self.create_publisher(LinearModel, "linear_model", LATCHED_QOS)
+        self._trim_point = Topic(self, TrimPoint, "trim_point", LATCHED_QOS, log)
+        self._linear_model = Topic(self, LinearModel, "linear_model", LATCHED_QOS, log)
         self.create_service(Trim, "trim", self._on_trim)
         self.create_service(Linearize, "linearize", self._on_linearize)
         self._sweeps = ThreadedActionServer(self, Sweep, "sweep", self._sweep, self.workers)
@@ -65,11 +69,15 @@ class Analysis(Component):
         self._sweeps.destroy()
         super().destroy_node()
 
+    def _now(self) -> float:
+        """Simulation time [s]; 0 where nothing flies."""
+        return 0.0 if self._loop is None else self._loop.time
+
     def _on_trim(self, request: Trim.Request, response: Trim.Response) -> Trim.Response:
         def act() -> None:
             point = trim(self._aircraft, **_condition(request), method=request.method)
             response.trim = trim_message(self._aircraft, point)
-            self._trim_point.publish(response.trim)
+            self._trim_point.publish(response.trim, self._now())
 
         return self.answer(response, act, "trimmed")
 
@@ -77,7 +85,7 @@ class Analysis(Component):
         def act() -> None:
             model = linearize(self._aircraft, **_condition(request), method=request.method)
             response.model = model_message(self._aircraft, model)
-            self._linear_model.publish(response.model)
+            self._linear_model.publish(response.model, self._now())
 
         return self.answer(response, act, "linearized")
 

@@ -7,24 +7,30 @@ import math
 import sys
 import time
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter as ROSParameter
 
-from sbs_msgs.msg import Controls, SwashplateArray
+from sbs_msgs.msg import Controls, FlightEvent, SwashplateArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.mixer import Mixer
+from sbs_sim.model.state import SWASHPLATE_NAMES
 from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, swashplate_messages, to_time
 from sbs_sim.nodes.host import (
     COMMAND_QOS,
     COMPLAINT_PERIOD,
+    EVENT_QOS,
     HEALTH_PERIOD,
     STATE_QOS,
+    Accepted,
     Component,
+    Log,
     Parameter,
     Refusals,
+    Topic,
     declare,
     diagnostic,
     run,
@@ -43,10 +49,13 @@ class ControlMixer(Component):
     ----------
     loop : FlightLoop, optional
         The flight, if it is in the same process: the mixer then knows the time, where the swashplates stand and of
-        resets. Else time comes from /clock, and the swashplates are taken to be at the first target.
+        resets. Else time comes from /clock, and where the swashplates stand from the events of the flight; until
+        one comes, they are taken to be at the first target.
+    log : Log, optional
+        Where accepted controls and the diagnostics are recorded.
     """
 
-    def __init__(self, loop: FlightLoop | None = None) -> None:
+    def __init__(self, loop: FlightLoop | None = None, log: Log | None = None) -> None:
         # the simulator owns time: rates are those of simulated time, and a pause holds the swashplates
         clock_topic = ROSParameter("use_sim_time", value=loop is None)
         super().__init__("control_mixer", parameter_overrides=[clock_topic])
@@ -57,8 +66,11 @@ class ControlMixer(Component):
         self._refusals = Refusals(self, "controls")
         self._last_seen: dict[str, float] = {}
         self._output = self.create_publisher(SwashplateArray, "swashplate", COMMAND_QOS)
-        self._health = self.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
+        self._health = Topic(self, DiagnosticArray, "diagnostics", STATE_QOS, log)
+        self._accepted = Accepted(self, Controls, "controls", COMMAND_QOS, log)
         self.create_subscription(Controls, "controls", self._on_controls, COMMAND_QOS)
+        if loop is None:
+            self.create_subscription(FlightEvent, "events", self._on_event, EVENT_QOS)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._ramp = self.create_timer(RAMP_PERIOD, self._go_on, clock=steady, autostart=False)
         self.create_timer(HEALTH_PERIOD, self._publish_health, clock=steady)
@@ -75,6 +87,14 @@ class ControlMixer(Component):
         self._mixer.forget()
         return True
 
+    def _on_event(self, message: FlightEvent) -> None:
+        """What was commanded before the aircraft was put somewhere is void."""
+        if message.kind in (FlightEvent.START, FlightEvent.RESET):
+            angles = np.array(message.swashplate).reshape(-1, len(SWASHPLATE_NAMES))
+            self._mixer.forget()
+            if len(angles) == len(self._mixer.aircraft.rotors):  # else it is another aircraft's
+                self._mixer.stand(angles)
+
     def _on_controls(self, message: Controls) -> None:
         self._follow_resets()
         try:
@@ -84,6 +104,7 @@ class ControlMixer(Component):
         except SbsError as error:
             self._refusals.add(error)
             return
+        self._accepted.keep(message, self._now())
         self._move()
 
     def _go_on(self) -> None:
@@ -122,7 +143,7 @@ class ControlMixer(Component):
         values = {"rate_limited": not self._mixer.arrived, **self._refusals.values()}
         message = DiagnosticArray(status=[diagnostic("control_mixer", problems, values)])
         message.header.stamp = to_time(self._now())
-        self._health.publish(message)
+        self._health.publish(message, self._now())
 
 
 def main(args: list[str] | None = None) -> None:

@@ -5,6 +5,7 @@ in the interface definitions say which field is in which frame.
 """
 
 import array
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from sbs_msgs.msg import (
     BodyState,
     Controls,
+    FlightEvent,
     Inflow,
     InflowArray,
     LinearModel,
@@ -30,6 +32,7 @@ from sbs_msgs.msg import (
     TrimCondition,
     TrimPoint,
 )
+from sbs_msgs.msg import Wind as WindMessage
 from sbs_msgs.srv import SetWind
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import linearize, modes, sweep, trim
@@ -38,7 +41,7 @@ from sbs_sim.model import state as S
 from sbs_sim.model.average import averaged_derivative
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.wind import LARGEST_WIND, Wind
-from sbs_sim.simulation import Snapshot, blade_angles, trimmed_state
+from sbs_sim.simulation import Event, Snapshot, blade_angles, trimmed_state
 
 Array = NDArray[np.float64]
 
@@ -97,6 +100,28 @@ def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
         turbulence_direction=math.atan2(relative[1], relative[0]) if moving else heading,
         turbulence_seed=request.turbulence_seed,
     )
+
+
+def event_message(event: Event, step_size: float) -> FlightEvent:
+    """Message of an event; the step size [s] gives its time."""
+    message = FlightEvent(step=event.step, kind=event.kind)
+    message.header.stamp = to_time(event.step * step_size)
+    if event.swashplate is not None:
+        message.swashplate = _doubles(event.swashplate)
+    if event.state is not None:
+        message.state = _doubles(event.state)
+    if event.wind is not None:
+        _fill_wind(message.wind, event.wind)
+    return message
+
+
+def _fill_wind(message: WindMessage, wind: Wind) -> None:
+    for field in dataclasses.fields(wind):
+        value = getattr(wind, field.name)
+        if isinstance(value, tuple):
+            _set_vector(getattr(message, field.name), value)
+        else:
+            setattr(message, field.name, value)
 
 
 def _triple(vector: Vector3 | Point) -> tuple[float, float, float]:

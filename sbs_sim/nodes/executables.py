@@ -34,6 +34,13 @@ def analysis() -> None:
     main()
 
 
+def replay() -> None:
+    """Run the executable `replay`."""
+    from sbs_sim.nodes.replay import main
+
+    main()
+
+
 def _end_at_once_when_interrupted() -> None:
     """Until the nodes run there is nothing to be ended in good order: `sbs_sim.nodes.host.run` takes over then."""
     for number in (signal.SIGINT, signal.SIGTERM):

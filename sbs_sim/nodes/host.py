@@ -8,7 +8,7 @@ import threading
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import rclpy
 import rclpy.utilities
@@ -19,6 +19,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter as ROSParameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from sbs_sim.errors import SbsError
@@ -29,6 +30,7 @@ COMPLAINT_PERIOD = 1.0  # s between complaints about bad input
 STOP_PERIOD = 0.2  # s, longest time that a thread takes to see the end
 END_PATIENCE = 3.0  # s that a thread may take to end
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # the last message is kept for whoever comes later
 LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -53,6 +55,55 @@ class Parameter:
     least: float | None = None
     most: float | None = None
     fixed: bool = True
+
+
+class Log(Protocol):
+    """Where messages are recorded; see `sbs_sim.nodes.recorder.Recorder`."""
+
+    def channel(self, topic: str, kind: Any, qos: QoSProfile) -> int:
+        """Channel for the messages of a topic."""
+
+    def write(self, channel: int, time: float, data: bytes, wait: bool = False) -> None:
+        """Record a serialised message of a simulation time [s]."""
+
+
+class Topic:
+    """A publisher that also writes what it publishes into the log: messages are serialised once, for both.
+
+    Parameters
+    ----------
+    node : Node
+    kind : type
+        Of the messages.
+    name : str
+    qos : QoSProfile
+    log : Log, optional
+    """
+
+    def __init__(self, node: Node, kind: Any, name: str, qos: QoSProfile, log: Log | None = None) -> None:
+        self._publisher = node.create_publisher(kind, name, qos)
+        self._log = log
+        self._channel = log.channel(self._publisher.topic_name, kind, qos) if log else 0
+
+    def publish(self, message: Any, time: float, wait: bool = False) -> None:
+        """Publish a message of a simulation time [s]; `wait` for room in the log if it must not be left out."""
+        data = serialize_message(message)
+        self._publisher.publish(data)
+        if self._log is not None:
+            self._log.write(self._channel, time, data, wait)
+
+
+class Accepted:
+    """A topic that is listened to: what is accepted of it goes into the log."""
+
+    def __init__(self, node: Node, kind: Any, name: str, qos: QoSProfile, log: Log | None = None) -> None:
+        self._log = log
+        self._channel = log.channel(node.resolve_topic_name(name), kind, qos) if log else 0
+
+    def keep(self, message: Any, time: float) -> None:
+        """Record a message that was accepted at a simulation time [s]."""
+        if self._log is not None:
+            self._log.write(self._channel, time, serialize_message(message))
 
 
 class Component(Node):
@@ -140,7 +191,7 @@ def _declare_one(node: Node, name: str, parameter: Parameter, given: dict[str, R
         descriptor.floating_point_range = [span]
         allowed = f"allowed are {parameter.least:g} to {parameter.most:g}"
     if name in given:
-        given[name] = ROSParameter(name, value=_as_floats(given[name].value, parameter.default))
+        given[name] = ROSParameter(name, value=_as_wanted(given[name].value, parameter.default))
     try:
         value = node.declare_parameter(name, parameter.default, descriptor).value
     except ParameterException:
@@ -150,8 +201,10 @@ def _declare_one(node: Node, name: str, parameter: Parameter, given: dict[str, R
     return value
 
 
-def _as_floats(value: Any, default: Any) -> Any:
-    """Whole numbers where numbers are wanted: 15 is as good as 15.0."""
+def _as_wanted(value: Any, default: Any) -> Any:
+    """Whole numbers where numbers are wanted, 15 is as good as 15.0; and the word that YAML takes for a false."""
+    if isinstance(default, str) and value is False:
+        return "off"
     if isinstance(default, float) and type(value) is int:
         return float(value)
     if isinstance(default, list) and isinstance(default[0], float) and isinstance(value, array.array | list | tuple):
@@ -171,8 +224,10 @@ def diagnostic(name: str, problems: Sequence[tuple[bytes, str]], values: dict[st
     )
 
 
-def run(make_nodes: Callable[[], list[Component]], args: list[str] | None = None) -> int:
-    """Run nodes until they are interrupted; the exit code of the process.
+def run(
+    make_nodes: Callable[[], list[Component]], args: list[str] | None = None, end: threading.Event | None = None
+) -> int:
+    """Run nodes until they are interrupted or have done their work; the exit code of the process.
 
     Every node has a thread and an executor of its own, so that a long service of one does not delay the messages of
     another. (rclpy's multi-threaded executor would do the same at many times the load, and callbacks that compute side
@@ -184,13 +239,15 @@ def run(make_nodes: Callable[[], list[Component]], args: list[str] | None = None
         Makes the nodes; an SbsError ends the process with its one line and exit code 1.
     args : list of str, optional
         Command line, sys.argv if not given.
+    end : threading.Event, optional
+        Set by a node that has done its work.
 
     Returns
     -------
     int
-        0 after an interruption (Ctrl-C, SIGTERM), 1 if the nodes could not start.
+        0 after an interruption (Ctrl-C, SIGTERM) or the end, 1 if the nodes could not start.
     """
-    stop = threading.Event()
+    stop = end or threading.Event()
     leftover = rclpy.utilities.remove_ros_args(args)[1:]
     if leftover:
         print(f"unknown argument {leftover[0]}: parameters are given as --ros-args -p name:=value", file=sys.stderr)

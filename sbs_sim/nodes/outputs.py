@@ -1,7 +1,7 @@
 """What the simulator publishes: a thread that turns the reports of a flight into messages."""
 
 import threading
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
@@ -10,10 +10,13 @@ from rclpy.clock import ClockType
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
-from sbs_msgs.msg import BodyState, InflowArray, RotorStateArray, SimulationStatus
+from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray, SimulationStatus
 from sbs_sim.flight_loop import FlightLoop, Report
-from sbs_sim.nodes.conversions import StateMessages, to_time
-from sbs_sim.nodes.host import HEALTH_PERIOD, STATE_QOS, Refusals, diagnostic
+from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
+from sbs_sim.nodes.host import EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Refusals, Topic, diagnostic
+
+if TYPE_CHECKING:
+    from sbs_sim.nodes.recorder import Recorder
 
 
 class Outputs:
@@ -26,20 +29,24 @@ class Outputs:
     loop : FlightLoop
     refusals : Refusals
         Commands that the simulator has refused.
+    log : Recorder, optional
+        Where everything that is published is recorded.
     """
 
-    def __init__(self, node: Node, loop: FlightLoop, refusals: Refusals) -> None:
-        self._node, self._loop, self._refusals = node, loop, refusals
+    def __init__(self, node: Node, loop: FlightLoop, refusals: Refusals, log: "Recorder | None" = None) -> None:
+        self._node, self._loop, self._refusals, self._log = node, loop, refusals, log
+        self._log_fault_said = False
         self._messages = StateMessages(loop.aircraft)
         self._clock_message, self._status = Clock(), SimulationStatus()
         self._last_report: Report | None = None
-        self._state = node.create_publisher(BodyState, "state", STATE_QOS)
-        self._rotors = node.create_publisher(RotorStateArray, "rotors", STATE_QOS)
-        self._inflow = node.create_publisher(InflowArray, "inflow", STATE_QOS)
-        self._odom = node.create_publisher(Odometry, "odom", STATE_QOS)
-        self._clock = node.create_publisher(Clock, "/clock", STATE_QOS)
-        self._status_topic = node.create_publisher(SimulationStatus, "status", STATE_QOS)
-        self._health = node.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
+        self._state = Topic(node, BodyState, "state", STATE_QOS, log)
+        self._rotors = Topic(node, RotorStateArray, "rotors", STATE_QOS, log)
+        self._inflow = Topic(node, InflowArray, "inflow", STATE_QOS, log)
+        self._odom = Topic(node, Odometry, "odom", STATE_QOS, log)
+        self._clock = Topic(node, Clock, "/clock", STATE_QOS, log)
+        self._events = Topic(node, FlightEvent, "events", EVENT_QOS, log)
+        self._status_topic = Topic(node, SimulationStatus, "status", STATE_QOS, log)
+        self._health = Topic(node, DiagnosticArray, "diagnostics", STATE_QOS, log)
         steady = SteadyClock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(HEALTH_PERIOD, self._publish_health, clock=steady)
         self._thread = threading.Thread(target=self._publish_all, name="publisher", daemon=True)
@@ -53,18 +60,22 @@ class Outputs:
         while (report := self._loop.reports.get()) is not None:
             self._say_changes(report)
             self._last_report = report
-            stamp = to_time(report.time)
+            # where nothing hurries the flight, the log may hold it up rather than miss something
+            now, wait = report.time, self._loop.pace == 0.0
+            stamp = to_time(now)
             self._clock_message.clock = stamp
-            self._clock.publish(self._clock_message)
+            self._clock.publish(self._clock_message, now, wait)
+            for event in report.events:
+                self._events.publish(event_message(event, self._loop.step_size), now, True)  # no flight without them
             if report.snapshot is not None:
                 self._messages.fill(report.snapshot)
-                self._state.publish(self._messages.state)
-                self._rotors.publish(self._messages.rotors)
-                self._inflow.publish(self._messages.inflow)
-                self._odom.publish(self._messages.odom)
-            self._publish_status(report, stamp)
+                self._state.publish(self._messages.state, now, wait)
+                self._rotors.publish(self._messages.rotors, now, wait)
+                self._inflow.publish(self._messages.inflow, now, wait)
+                self._odom.publish(self._messages.odom, now, wait)
+            self._publish_status(report, stamp, wait)
 
-    def _publish_status(self, report: Report, stamp: Any) -> None:
+    def _publish_status(self, report: Report, stamp: Any, wait: bool) -> None:
         status = self._status
         status.header.stamp = stamp
         status.state = SimulationStatus.PLAYING if report.playing else SimulationStatus.PAUSED
@@ -75,15 +86,24 @@ class Outputs:
         status.dropped_messages = report.dropped
         status.rejected_messages = self._refusals.count
         status.fault = report.fault
-        self._status_topic.publish(status)
+        if self._log is not None:
+            status.log, status.log_dropped, status.log_fault = str(self._log.path), self._log.dropped, self._log.fault
+        self._status_topic.publish(status, report.time, wait)
 
     def _say_changes(self, report: Report) -> None:
         """One log line when a fault or a time-out begins."""
         before, log = self._last_report, self._node.get_logger()
         if report.fault and (before is None or report.fault != before.fault):
             log.error(f"paused: {report.fault}")
+        self._say_log_fault()
         if report.command_timed_out and (before is None or not before.command_timed_out):
             log.warning(f"no command for {self._loop.command_timeout:g} s: holding the last one")
+
+    def _say_log_fault(self) -> None:
+        """One log line when the recording fails."""
+        if self._log is not None and self._log.fault and not self._log_fault_said:
+            self._log_fault_said = True
+            self._node.get_logger().error(f"the flight goes on without its log: {self._log.fault}")
 
     def _publish_health(self) -> None:
         report = self._last_report
@@ -94,6 +114,9 @@ class Outputs:
             problems.append((DiagnosticStatus.ERROR, report.fault))
         if report.command_timed_out:
             problems.append((DiagnosticStatus.WARN, "command timed out, holding the last one"))
+        if self._log is not None and (self._log.fault or self._log.dropped):
+            lost = f"{self._log.dropped} messages not recorded {self._log.fault}"
+            problems.append((DiagnosticStatus.WARN, lost.strip()))
         if report.dropped:
             problems.append((DiagnosticStatus.WARN, f"{report.dropped} ticks not published"))
         values = {
@@ -104,4 +127,4 @@ class Outputs:
         }
         message = DiagnosticArray(status=[diagnostic("simulator", problems, values)])
         message.header.stamp = to_time(report.time)
-        self._health.publish(message)
+        self._health.publish(message, report.time)

@@ -6,7 +6,7 @@ Publishes `state`, `rotors`, `inflow`, `odom`, `/clock`, `status`, `diagnostics`
 
 import math
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import SetParametersResult
 from std_srvs.srv import SetBool
@@ -22,14 +22,18 @@ from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.analysis import Analysis
 from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
-from sbs_sim.nodes.host import COMMAND_QOS, Component, Parameter, Refusals, declare, run
+from sbs_sim.nodes.host import COMMAND_QOS, Accepted, Component, Parameter, Refusals, declare, run
 from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.simulation import Simulation, trimmed_state
 
-COMPONENTS = ("simulator", "control_mixer", "analysis")
+if TYPE_CHECKING:
+    from sbs_sim.nodes.recorder import Recorder
+
+OFF = "off"
+COMPONENTS = ("simulator", "control_mixer", "analysis", "recorder")
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
-    "components": Parameter(list(COMPONENTS), f"Nodes to bring up in this process: {', '.join(COMPONENTS)}"),
+    "components": Parameter(list(COMPONENTS), f"What to bring up in this process: {', '.join(COMPONENTS)}"),
     "airspeed": Parameter(0.0, "Start: horizontal velocity relative to the air [m/s]", -100.0, 100.0),
     "climb_rate": Parameter(0.0, "Start: vertical velocity relative to the air, up positive [m/s]", -50.0, 50.0),
     "sideslip": Parameter(0.0, "Start: angle from heading to track, right positive [rad]", -math.pi, math.pi),
@@ -50,6 +54,9 @@ PARAMETERS = {
         1e6,
         fixed=False,
     ),
+    "record": Parameter(
+        "", "Log of the flight: a file, an existing folder, empty for bags/<date>_<time>_<aircraft>.mcap, or off"
+    ),
     "wind": Parameter([0.0, 0.0, 0.0], "Steady wind: north, east, down, where the air goes to [m/s]"),
 }
 
@@ -63,15 +70,28 @@ class Simulator(Component):
         self.components = checked_components(values["components"])
         self.aircraft = Aircraft.load(values["aircraft"])
         self._fidelity = {"lead_lag": values["lead_lag"], "cyclic_inflow": values["cyclic_inflow"]}
-        self.loop = FlightLoop(self._start(values), values["real_time_factor"], values["command_timeout"])
+        simulation = self._start(values)
+        self.loop = FlightLoop(simulation, values["real_time_factor"], values["command_timeout"])
+        self.log = self._make_log(simulation, values)
         self._refusals = Refusals(self, "swashplate")
-        self._outputs = Outputs(self, self.loop, self._refusals)
+        self._outputs = Outputs(self, self.loop, self._refusals, self.log)
+        self._accepted = Accepted(self, SwashplateArray, "swashplate", COMMAND_QOS, self.log)
         self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
         self.create_service(SetBool, "pause", self._on_pause)
         self.create_service(Step, "step", self._on_step)
         self.create_service(Reset, "reset", self._on_reset)
         self.create_service(SetWind, "set_wind", self._on_set_wind)
         self.add_on_set_parameters_callback(self._on_parameters)
+
+    def _make_log(self, simulation: Simulation, values: dict[str, Any]) -> "Recorder | None":
+        """Recorder of the flight; None if it is not wanted."""
+        if "recorder" not in self.components or values["record"] == OFF:
+            return None
+        from sbs_sim.nodes.recorder import Recorder  # here, because who does not record need not have its packages
+
+        log = Recorder(values["record"], simulation, values)
+        self.get_logger().info(f"recording {log.path}")
+        return log
 
     def _start(self, values: dict[str, Any]) -> Simulation:
         """Simulation in trimmed flight at the condition that the parameters name."""
@@ -109,6 +129,8 @@ class Simulator(Component):
             self.loop.command(swashplate_array(message))
         except SbsError as error:
             self._refusals.add(error)
+            return
+        self._accepted.keep(message, self.loop.time)
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         done = "paused" if request.data else "playing"
@@ -154,6 +176,8 @@ class Simulator(Component):
     def destroy_node(self) -> None:
         """End the publishing, then the node."""
         self._outputs.join()
+        if self.log is not None:
+            self.log.close()
         super().destroy_node()
 
 
@@ -175,9 +199,9 @@ def _nodes() -> list[Component]:
     simulator = Simulator()
     nodes: list[Component] = [simulator]
     if "control_mixer" in simulator.components:
-        nodes.append(ControlMixer(simulator.loop))
+        nodes.append(ControlMixer(simulator.loop, simulator.log))
     if "analysis" in simulator.components:
-        nodes.append(Analysis(simulator.aircraft))
+        nodes.append(Analysis(simulator.loop, simulator.log))
     simulator.loop.start()  # last: what is loaded meanwhile would make it miss deadlines
     return nodes
 

@@ -1,0 +1,120 @@
+"""The log of a flight: everything that the nodes of a process publish or accept, into one MCAP file.
+
+Not a node: messages come serialised from the publishers (`sbs_sim.nodes.host.Topic`), so recording costs a queue.
+"""
+
+import datetime
+import os
+from pathlib import Path
+from typing import Any
+
+from ament_index_python.packages import get_package_share_directory
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from sbs_sim.errors import RecordingError
+from sbs_sim.recording import LogWriter, message_definition, qos_profiles
+from sbs_sim.recording.flight import attachments, simulation_metadata, versions
+from sbs_sim.simulation import Simulation
+
+CLOSING_TIME = 10.0  # s to get the rest of a log onto the disk
+
+
+class Recorder:
+    """Writes the log of one flight.
+
+    Parameters
+    ----------
+    record : str
+        Where to: the path of a file, or of an existing folder, or empty for the default folder.
+    simulation : Simulation
+    parameters : dict of str to object
+        Of the nodes, for the record.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be made.
+    """
+
+    def __init__(self, record: str, simulation: Simulation, parameters: dict[str, Any]) -> None:
+        begin = datetime.datetime.now(datetime.timezone.utc).astimezone()
+        self.path = log_path(record, simulation.aircraft.name, begin)
+        self._channels: dict[str, int] = {}
+        self._writer = LogWriter(
+            self.path,
+            library=f"sbs_sim {versions()['sbs_sim']}",
+            wall_start=round(begin.timestamp() * 1e9),
+            metadata={
+                "simulation": simulation_metadata(simulation),
+                "versions": versions(),
+                "parameters": {name: repr(value) for name, value in parameters.items()},
+            },
+            attachments=attachments(simulation.aircraft),
+        )
+
+    @property
+    def dropped(self) -> int:
+        """Messages that did not get into the log."""
+        return self._writer.dropped
+
+    @property
+    def fault(self) -> str:
+        """Why the log cannot go on; empty if it can."""
+        return self._writer.failed
+
+    def channel(self, topic: str, kind: Any, qos: QoSProfile) -> int:
+        """Channel for the messages of a topic."""
+        if topic in self._channels:  # several nodes publish it
+            return self._channels[topic]
+        package, name = kind.__module__.split(".")[0], kind.__name__
+        type_name = f"{package}/msg/{name}"
+        definition = message_definition(type_name, definition_file)
+        self._channels[topic] = self._writer.add_channel(topic, type_name, definition, offered(qos))
+        return self._channels[topic]
+
+    def write(self, channel: int, time: float, data: bytes, wait: bool = False) -> None:
+        """Record a serialised message of a simulation time [s]; one that finds no room is counted, not waited for."""
+        self._writer.write(channel, round(time * 1e9), data, wait)
+
+    def close(self) -> None:
+        """Write the rest and end the file."""
+        self._writer.close(CLOSING_TIME)
+
+
+def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
+    """File of a log: the one that was named, or one named after time and aircraft in a folder.
+
+    Raises
+    ------
+    RecordingError
+        The default folder cannot be made.
+    """
+    if record and not Path(record).is_dir():
+        return Path(record)
+    folder = Path(record or os.environ.get("SBS_SIM_BAGS") or "bags")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"{folder}: {error.strerror}") from None
+    return folder / f"{begin:%Y-%m-%d_%H-%M-%S}_{aircraft}.mcap"
+
+
+def definition_file(package: str, place: str) -> Path:
+    """Path of an installed interface definition.
+
+    Raises
+    ------
+    LookupError
+        The package is not installed.
+    """
+    return Path(get_package_share_directory(package)) / place
+
+
+def offered(qos: QoSProfile) -> str:
+    """Quality of service as a log holds it."""
+    return qos_profiles(
+        "reliable" if qos.reliability == ReliabilityPolicy.RELIABLE else "best_effort",
+        "transient_local" if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL else "volatile",
+        "keep_all" if qos.history == HistoryPolicy.KEEP_ALL else "keep_last",
+        qos.depth,
+    )

@@ -1,0 +1,293 @@
+"""What a log of ours says of a flight: aircraft, options, events, states; and the flight flown again from them."""
+
+import importlib.metadata
+import io
+import itertools
+import platform
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import numpy as np
+from numpy.typing import NDArray
+from ruamel.yaml import YAML
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.errors import RecordingError
+from sbs_sim.model.kernel import source_digest
+from sbs_sim.model.wind import Wind
+from sbs_sim.recording.log import Log, Topic
+from sbs_sim.simulation import Event, Simulation, Snapshot, refly
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+AIRCRAFT_FILE = "aircraft.yaml"
+AIRFOIL_FOLDER = "airfoils"
+OPTIONS = {"tick": float, "azimuth_step": float, "lead_lag": bool, "cyclic_inflow": bool, "method": str}
+WIND_VECTORS = ("velocity", "gust", "turbulence_intensity")
+WIND_NUMBERS = ("gust_delay", "gust_duration", "turbulence_length", "turbulence_airspeed", "turbulence_direction")
+# Other machine code rounds otherwise, and the rotors' fast modes carry that along: what may then differ, relative to
+# the largest magnitude of each state in the flight.
+TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A recorded flight.
+
+    Attributes
+    ----------
+    aircraft : Aircraft
+    options : dict
+        Those of `Simulation`.
+    events : tuple of Event
+        Everything that acted on the flight, the start first.
+    steps : ndarray of int, shape (n,)
+        Integration step of each recorded state.
+    states : ndarray, shape (n, size)
+        Simulation states.
+    versions : dict of str to str
+        Of everything that decides a result.
+    folder : TemporaryDirectory
+        Holds the files of the aircraft as long as the flight is there.
+    """
+
+    aircraft: Aircraft
+    options: dict[str, Any]
+    events: tuple[Event, ...]
+    steps: IntArray
+    states: Array
+    versions: dict[str, str]
+    folder: "tempfile.TemporaryDirectory[str]" = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One state of one step that did not come again."""
+
+    step: int
+    time: float
+    state: str
+    logged: float
+    flown: float
+    relative: float  # to the largest magnitude of this state in the flight
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Result of flying a log again.
+
+    Attributes
+    ----------
+    states : int
+        Recorded states that were compared.
+    first, largest : Difference or None
+        None if every bit is the same.
+    other_versions : dict of str to (str, str)
+        What differs between the log and this machine: recorded, here.
+    """
+
+    states: int
+    first: Difference | None
+    largest: Difference | None
+    other_versions: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+    @property
+    def within_tolerance(self) -> bool:
+        """True if no state differs by more than what other machine code may do."""
+        return self.largest is None or self.largest.relative <= TOLERANCE
+
+    @property
+    def identical(self) -> bool:
+        """True if every bit of every state is the same."""
+        return self.first is None
+
+
+# --- what goes into a log ---------------------------------------------------------------------------------------
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that decides the bits of a result."""
+    packages = ("sbs_sim", "numpy", "numba", "llvmlite")
+    found = {name: importlib.metadata.version(name) for name in packages}
+    features = sorted(name for name, there in llvmlite.binding.get_host_cpu_features().items() if there)
+    return {
+        **found,
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "libc": " ".join(platform.libc_ver()),
+        "cpu": llvmlite.binding.get_host_cpu_name(),
+        "cpu_features": ",".join(features),
+        "model_sources": source_digest(),
+    }
+
+
+def simulation_metadata(simulation: Simulation) -> dict[str, str]:
+    """Options of a simulation as text that gives back their bits."""
+    return {
+        "aircraft": simulation.aircraft.name,
+        "parameter_hash": simulation.aircraft.parameter_hash,
+        **{name: str(value) for name, value in simulation.options.items()},
+        "step_size": repr(simulation.step_size),
+        "steps_per_tick": repr(simulation.steps_per_tick),
+    }
+
+
+def attachments(aircraft: Aircraft) -> dict[str, bytes]:
+    """The aircraft as files: its own and those of its airfoils."""
+    data, files = aircraft.files()
+    text = io.BytesIO()
+    YAML(typ="safe", pure=True).dump(data, text)
+    return {AIRCRAFT_FILE: text.getvalue(), **{f"{AIRFOIL_FOLDER}/{name}": content for name, content in files.items()}}
+
+
+# --- what comes out of it ---------------------------------------------------------------------------------------
+
+
+def flight_of(log: Log) -> Flight:
+    """Flight that a log holds.
+
+    Raises
+    ------
+    RecordingError
+        The log is not one of this package's, or lacks a part.
+    """
+    try:
+        simulation, recorded = log.metadata["simulation"], log.metadata["versions"]
+        folder = tempfile.TemporaryDirectory(prefix="sbs_sim-")
+        aircraft = _aircraft(log.attachments, Path(folder.name))
+        if aircraft.parameter_hash != simulation["parameter_hash"]:
+            raise RecordingError("the aircraft in the log is not the one that was flown: its hash differs")
+        steps, states = _states(log, aircraft, float(simulation["step_size"]))
+        options = {name: _option(simulation[name], kind) for name, kind in OPTIONS.items()}
+        return Flight(aircraft, options, _events(log, aircraft), steps, states, dict(recorded), folder)
+    except KeyError as error:
+        raise RecordingError(f"the log holds no flight of sbs_sim: {error.args[0]} is missing") from None
+
+
+def _option(text: str, kind: type) -> Any:
+    if kind is bool:
+        return text == "True"
+    return text if kind is str else kind(text)
+
+
+def _aircraft(files: Mapping[str, bytes], folder: Path) -> Aircraft:
+    """Aircraft of the attached files, which are laid into a folder."""
+    (folder / AIRCRAFT_FILE).write_bytes(files[AIRCRAFT_FILE])
+    for name, content in files.items():
+        if name.startswith(f"{AIRFOIL_FOLDER}/"):
+            (folder / Path(name).name).write_bytes(content)  # nowhere else, whatever a log calls it
+    return Aircraft.load(folder / AIRCRAFT_FILE)
+
+
+def _events(log: Log, aircraft: Aircraft) -> tuple[Event, ...]:
+    """Events in their order."""
+    topic = log["events"]
+    found = []
+    for i, kind in enumerate(topic["kind"]):
+        swashplate, state = (np.array(topic[name][i], dtype=float) for name in ("swashplate", "state"))
+        found.append(
+            Event(
+                int(topic["step"][i]),
+                str(kind),
+                swashplate.reshape(len(aircraft.rotors), -1) if swashplate.size else None,
+                state if state.size else None,
+                _wind(topic, i) if kind in ("start", "wind") else None,
+            )
+        )
+    return tuple(found)
+
+
+def _wind(topic: Topic, i: int) -> Wind:
+    fields: dict[str, Any] = {
+        name: tuple(float(topic[f"wind.{name}.{axis}"][i]) for axis in "xyz") for name in WIND_VECTORS
+    }
+    fields |= {name: float(topic[f"wind.{name}"][i]) for name in WIND_NUMBERS}
+    return Wind(**fields, turbulence_seed=int(topic["wind.turbulence_seed"][i]))
+
+
+def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, Array]:
+    """Simulation states where all three topics that make them up were recorded."""
+    body, rotors, inflow = log["state"], log["rotors"], log["inflow"]
+    times, where = _common(body.time_ns, rotors.time_ns, inflow.time_ns)
+    layout = aircraft.layout
+    states = np.zeros((len(times), layout.size))
+    fields = [f"position.{axis}" for axis in "xyz"] + [f"attitude.{axis}" for axis in "wxyz"]
+    fields += [f"velocity.{axis}" for axis in "xyz"] + [f"angular_velocity.{axis}" for axis in "xyz"]
+    for place, name in enumerate(fields):
+        states[:, place] = body[name][where[0]]
+    for j in range(len(aircraft.rotors)):
+        parts = {"flap": layout.flap, "flap_rate": layout.flap_rate, "lag": layout.lag, "lag_rate": layout.lag_rate}
+        for name, place_of in parts.items():
+            states[:, place_of(j)] = rotors[f"rotors[{j}].{name}"][where[1]]
+        for place, name in enumerate(("uniform", "sine", "cosine"), layout.inflow(j).start):
+            states[:, place] = inflow[f"rotors[{j}].{name}"][where[2]]
+    return np.round(times * 1e-9 / step_size).astype(np.int64), states
+
+
+def _common(*times: IntArray) -> tuple[IntArray, list[IntArray]]:
+    """Instants that all topics have, and where; an instant that comes twice (a reset) keeps its order."""
+    keys = []
+    for own in times:
+        first = np.searchsorted(own, own, side="left")
+        keys.append(own * 16 + np.minimum(np.arange(len(own)) - first, 15))
+    common = keys[0]
+    for other in keys[1:]:
+        common = np.intersect1d(common, other)
+    return common // 16, [np.searchsorted(own, common) for own in keys]
+
+
+# --- flown again ------------------------------------------------------------------------------------------------
+
+
+def verify(flight: Flight) -> Verification:
+    """Fly a recorded flight again and compare every recorded state, bit for bit.
+
+    Raises
+    ------
+    SbsError
+        The flight cannot be flown from what the log holds.
+    """
+    here = versions()
+    known = flight.versions
+    other = {name: (known.get(name, ""), own) for name, own in here.items() if known.get(name) != own}
+    first: Difference | None = None
+    largest: Difference | None = None
+    scale = np.maximum(np.abs(flight.states).max(axis=0), 1e-12)
+    for i, flown in _beside(flight, refly(flight.aircraft, flight.events, int(flight.steps[-1]), **flight.options)):
+        logged = flight.states[i]
+        if logged.tobytes() == flown.state.tobytes():
+            continue
+        distance = np.abs(logged - flown.state) / scale
+        place = int(np.argmax(distance))
+        found = Difference(
+            flown.step,
+            flown.time,
+            flight.aircraft.layout.names[place],
+            float(logged[place]),
+            float(flown.state[place]),
+            float(distance[place]),
+        )
+        first = first or found
+        largest = found if largest is None or found.relative > largest.relative else largest
+    return Verification(len(flight.states), first, largest, other)
+
+
+def _beside(flight: Flight, flown: Iterable[Snapshot]) -> Iterator[tuple[int, Snapshot]]:
+    """Index of each recorded state with the snapshot that was flown at its step; around a reset a step has several."""
+    places: dict[int, list[int]] = {}
+    for i, step in enumerate(flight.steps.tolist()):
+        places.setdefault(step, []).append(i)
+    for step, group in itertools.groupby(flown, key=lambda snapshot: snapshot.step):
+        snapshots = list(group)
+        for i in places.pop(step, []):
+            recorded = flight.states[i].tobytes()
+            match = next((k for k, found in enumerate(snapshots) if found.state.tobytes() == recorded), 0)
+            yield i, snapshots[match]
+            snapshots = snapshots[match + 1 :] or snapshots[-1:]
+    if places:
+        raise RecordingError(f"step {min(places)} was recorded but is not flown by the events of the log")

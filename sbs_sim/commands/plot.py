@@ -1,0 +1,32 @@
+"""Command `plot`: a recorded flight over time."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from sbs_sim.commands.common import execute
+
+
+def main() -> None:
+    """Draw what the command line names."""
+    parser = argparse.ArgumentParser(prog="plot", description="Draw a recorded flight over time.")
+    parser.add_argument("file", type=Path, help="MCAP log")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        action="append",
+        metavar="FILE",
+        help=".png, .svg or .html; may be given several times (default: the log's name with .png)",
+    )
+    sys.exit(execute(parser, _work))
+
+
+def _work(arguments: argparse.Namespace) -> None:
+    from sbs_sim.recording import read
+    from sbs_sim.recording.plot import plot
+
+    log = read(arguments.file)
+    if not log.complete:
+        print(f"{arguments.file} is not complete: {'; '.join(log.reasons)}", file=sys.stderr)
+    for path in arguments.out or [Path(arguments.file.name).with_suffix(".png")]:
+        print(f"written: {plot(log, path)}")

@@ -1,0 +1,204 @@
+"""Plots of a recorded flight over time: attitude, rates, velocity, controls, rotor coordinates, inflow."""
+
+import io
+from collections.abc import Callable, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from sbs_sim.errors import RecordingError
+from sbs_sim.model.frames import quaternion_to_euler
+from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
+from sbs_sim.recording.log import Log, Topic
+
+Array = NDArray[np.float64]
+Curves = Mapping[str, tuple[Array, Array]]  # name to time and values
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
+DASHES = ("-", "--", "-.", ":")
+SUFFIXES = (".png", ".svg", ".html")
+WIDTH, PANEL_HEIGHT = 8.0, 1.7  # in
+STILL = 1e-6  # what an axis covers at least
+# Fixed, so that the same log gives the same bytes; text stays text.
+SETTINGS: Any = {"svg.hashsalt": "sbs_sim", "svg.fonttype": "none", "font.size": 9.0}
+PAGE = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
+<style>body {{ font-family: sans-serif; margin: 2em auto; max-width: 60em; }} svg {{ width: 100%; height: auto; }}
+td {{ padding-right: 1.5em; vertical-align: top; }}</style></head>
+<body><h1>{title}</h1><table>{rows}</table>
+{figure}
+</body></html>
+"""
+
+
+def plot(log: Log, path: str | Path) -> Path:
+    """Draw a flight into a file.
+
+    Parameters
+    ----------
+    log : Log
+    path : path-like
+        .png, .svg or .html.
+
+    Raises
+    ------
+    RecordingError
+        Another suffix, nothing to draw, or the file cannot be written.
+    """
+    target = Path(path)
+    if target.suffix not in SUFFIXES:
+        raise RecordingError(f"{target}: allowed are {', '.join(SUFFIXES)}")
+    figure = flight_figure(log)
+    kind = "png" if target.suffix == ".png" else "svg"
+    with rc_context(SETTINGS), io.BytesIO() as stream:
+        figure.savefig(stream, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
+        data = stream.getvalue()
+    if target.suffix == ".html":
+        data = _page(log, data.decode()).encode()
+    try:
+        target.write_bytes(data)
+    except OSError as error:
+        raise RecordingError(f"cannot write {target}: {error.strerror}") from None
+    return target
+
+
+def flight_figure(log: Log) -> Figure:
+    """Panels over a common time axis, one for each kind of quantity that the log holds.
+
+    Raises
+    ------
+    RecordingError
+        It holds none of them.
+    """
+    panels = [(label, curves) for label, make in PANELS.items() if (curves := make(log))]
+    if not panels:
+        raise RecordingError(f"{log.path}: nothing to draw, there are {', '.join(log.topics) or 'no topics'}")
+    with rc_context(SETTINGS):
+        figure = Figure(figsize=(WIDTH, PANEL_HEIGHT * len(panels) + 0.6), layout="constrained")
+        FigureCanvasAgg(figure)
+        rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (label, curves) in zip(rows, panels, strict=True):
+            _draw(axes, label, curves)
+        rows[-1].set_xlabel("simulation time [s]")
+    return figure
+
+
+def _draw(axes: Axes, label: str, curves: Curves) -> None:
+    largest = STILL
+    for i, (name, (time, values)) in enumerate(curves.items()):
+        axes.plot(
+            time, values, color=COLOURS[i % len(COLOURS)], linestyle=DASHES[i % len(DASHES)], linewidth=1.2, label=name
+        )
+        largest = max(largest, float(np.nanmax(np.abs(values), initial=0.0)))
+    low, high = axes.get_ylim()
+    if high - low < 1e-3 * largest:  # rounding is no signal
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.05 * largest, middle + 0.05 * largest)
+    axes.set_ylabel(label)
+    axes.grid(color="#dddddd", linewidth=0.6)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
+
+
+# --- what a panel shows -----------------------------------------------------------------------------------------
+
+
+def _topic(log: Log, name: str) -> Topic | None:
+    return log[name] if name in log.topics or f"/{name}" in log.topics else None
+
+
+def _fields(log: Log, topic: str, names: Mapping[str, str], factor: float = 1.0) -> dict[str, tuple[Array, Array]]:
+    """Curves of fields by the name that they are shown with."""
+    found = _topic(log, topic)
+    if found is None or not len(found.time):
+        return {}
+    return {shown: (found.time, factor * found[field]) for shown, field in names.items() if field in found}
+
+
+def _attitude(log: Log) -> Curves:
+    state = _topic(log, "state")
+    if state is None or not len(state.time):
+        return {}
+    quaternions = np.stack([state[f"attitude.{axis}"] for axis in "wxyz"], axis=1)
+    angles = np.degrees([quaternion_to_euler(quaternion) for quaternion in quaternions])
+    angles[:, 0] = np.degrees(np.unwrap(np.radians(angles[:, 0])))
+    names = ("yaw", "pitch", "roll")
+    return {name: (state.time, angles[:, i]) for i, name in enumerate(names)}
+
+
+def _vector(topic: str, field: str, names: str, factor: float = 1.0) -> Callable[[Log], Curves]:
+    return lambda log: _fields(
+        log, topic, {name: f"{field}.{axis}" for name, axis in zip(names, "xyz", strict=True)}, factor
+    )
+
+
+def _height(log: Log) -> Curves:
+    return {
+        **_fields(log, "state", {"north": "position.x", "east": "position.y"}),
+        **_fields(log, "state", {"height": "position.z"}, -1.0),
+    }
+
+
+def _controls(log: Log) -> Curves:
+    names = {name.replace("_", " "): name for name in CONTROL_NAMES}
+    return _fields(log, "controls", names, np.degrees(1.0))
+
+
+def _swashplate(log: Log) -> Curves:
+    return _of_rotors(log, "swashplate", {name: name for name in SWASHPLATE_NAMES}, np.degrees(1.0))
+
+
+def _of_rotors(log: Log, topic: str, fields: Mapping[str, str], factor: float) -> Curves:
+    found = _topic(log, topic)
+    if found is None:
+        return {}
+    rotors = sorted({name.split("]")[0] + "]" for name in found if name.startswith("rotors[")})
+    names = {
+        f"{shown.replace('_', ' ')} ({j + 1})": f"{rotor}.{field}"
+        for j, rotor in enumerate(rotors)
+        for shown, field in fields.items()
+    }
+    return _fields(log, topic, names, factor)
+
+
+def _coordinates(field: str, names: tuple[str, ...]) -> Callable[[Log], Curves]:
+    """Multiblade coordinates of all rotors [deg]."""
+
+    def curves(log: Log) -> Curves:
+        whole = _of_rotors(log, "rotors", {field: field}, np.degrees(1.0))
+        found = {}
+        for shown, (time, values) in whole.items():
+            for i, name in enumerate(names[: values.shape[1]] if values.ndim == 2 else ()):
+                found[f"{name} {shown[shown.index('(') :]}"] = (time, values[:, i])
+        return found
+
+    return curves
+
+
+PANELS: dict[str, Callable[[Log], Curves]] = {
+    "place [m]": _height,
+    "velocity [m/s]": _vector("state", "velocity", "uvw"),
+    "attitude [deg]": _attitude,
+    "rates [deg/s]": _vector("state", "angular_velocity", "pqr", np.degrees(1.0)),
+    "controls [deg]": _controls,
+    "swashplates [deg]": _swashplate,
+    "flap [deg]": _coordinates("flap", ("a0", "a1", "b1")),
+    "lag [deg]": _coordinates("lag", ("xi0", "xic", "xis")),
+    "inflow [1]": lambda log: _of_rotors(
+        log, "inflow", {"lambda0": "uniform", "lambdas": "sine", "lambdac": "cosine"}, 1.0
+    ),
+    "power [W]": lambda log: _of_rotors(log, "rotors", {"power": "power"}, 1.0),
+}
+
+
+def _page(log: Log, svg: str) -> str:
+    facts = {"log": str(log.path), "complete": "yes" if log.complete else "; ".join(log.reasons)}
+    facts |= log.metadata.get("simulation", {})
+    rows = "".join(f"<tr><td>{escape(key)}</td><td>{escape(value)}</td></tr>" for key, value in facts.items())
+    return PAGE.format(title=escape(log.path.name), rows=rows, figure=svg[svg.index("<svg") :])

@@ -208,13 +208,16 @@ def test_what_was_recorded_before_a_kill_can_be_read_after_it(tmp_path, hover):
     log = read(tmp_path / "a.mcap")
     assert not log.complete
     assert log["state"].time[-1] > last - 0.5
-    found = replay("--recover", tmp_path / "whole.mcap", tmp_path / "a.mcap")
+    found = replay("--recover", tmp_path / "a.mcap")
     assert found.returncode == 3
     assert "lost" in found.stdout
-    whole = read(tmp_path / "whole.mcap")
+    whole = read(tmp_path / "a.recovered.mcap")
     assert whole.complete
     np.testing.assert_array_equal(whole["state"]["position.z"], log["state"]["position.z"])
-    assert replay("--verify", tmp_path / "whole.mcap").returncode == 0
+    assert replay("--verify", tmp_path / "a.recovered.mcap").returncode == 0
+    again = replay("--recover", tmp_path / "a.recovered.mcap", "--output", tmp_path / "again.mcap")
+    assert again.returncode == 0
+    assert "nothing was lost" in again.stdout
 
 
 # -- flown again -----------------------------------------------------------------------------------------------------
@@ -424,8 +427,8 @@ def test_replay_again_and_again_until_it_is_ended(tmp_path, recorded):
         (["--rate", "0", "x.mcap"], 2, "--rate 0.0: allowed are 0.001 to 1000"),
         (["--start", "3", "--end", "1", "x.mcap"], 2, "--start 3.0"),
         (["--verify", "nothing.mcap"], 1, "nothing.mcap"),
-        (["--recover", "out.mcap", "nothing.mcap"], 1, "nothing.mcap"),
-        (["--verify", "--recover", "a.mcap", "x.mcap"], 2, "not allowed with"),
+        (["--recover", "nothing.mcap"], 1, "nothing.mcap"),
+        (["--verify", "--recover", "x.mcap"], 2, "not allowed with"),
     ],
 )
 def test_bad_arguments_are_named(arguments, code, text):

@@ -344,8 +344,8 @@ def main(args: list[str] | None = None) -> None:
     """Do with a log what the command line asks for."""
     options = _parse(rclpy.utilities.remove_ros_args(args)[1:])
     try:
-        if options.recover is not None:
-            sys.exit(_recover(options.file, options.recover))
+        if options.recover:
+            sys.exit(_recover(options.file, options.output))
         if options.verify:
             sys.exit(_verify(options.file))
         if options.changes:
@@ -369,11 +369,13 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     )
     one = parser.add_mutually_exclusive_group()
     one.add_argument("--verify", action="store_true", help="fly the log again and compare every state bit for bit")
-    one.add_argument("--recover", nargs="?", const="", metavar="OUTPUT", help="rewrite a truncated or damaged log")
+    one.add_argument("--recover", action="store_true", help="rewrite a truncated or damaged log")
     one.add_argument(
         "--with", dest="changes", action="append", metavar="KEY=VALUE", help="fly the commands with a changed aircraft"
     )
-    parser.add_argument("--output", default="", help="log that --with writes, a file or a folder")
+    parser.add_argument(
+        "--output", default="", help="log to write, a file or a folder (default of --recover: FILE.recovered.mcap)"
+    )
     options = parser.parse_args(arguments)
     if not 1.0 / LARGEST_RATE <= options.rate <= LARGEST_RATE:
         parser.error(f"--rate {options.rate}: allowed are {1 / LARGEST_RATE:g} to {LARGEST_RATE:g}")
@@ -397,7 +399,9 @@ def _replay(options: argparse.Namespace) -> int:
 
 def _recover(path: Path, output: str) -> int:
     """0 if nothing was lost, 3 if something was; a log that cannot be recovered is an error."""
-    target = Path(output) if output else path.with_name(path.stem + RECOVERED)
+    target = Path(output) if output else path.with_name(f"{path.stem}{RECOVERED}")
+    if target.is_dir():
+        target /= f"{path.stem}{RECOVERED}"
     found = recover(path, target)
     until = "" if found.last_time is None else f" until {found.last_time:.3f} s"
     print(f"{target}: {found.messages} messages{until}")

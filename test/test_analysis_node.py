@@ -17,8 +17,10 @@ from ros_harness import DOMAINS, Client, world  # noqa: E402
 from sbs_msgs.action import Sweep  # noqa: E402
 from sbs_msgs.msg import BodyState, LinearModel, SimulationStatus, TrimPoint  # noqa: E402
 from sbs_msgs.srv import Linearize, Trim  # noqa: E402
-from sbs_sim import Aircraft, linearize, trim  # noqa: E402
+from sbs_sim import Aircraft, Simulation, linearize, trim  # noqa: E402
+from sbs_sim.flight_loop import FlightLoop  # noqa: E402
 from sbs_sim.model import state as S  # noqa: E402
+from sbs_sim.simulation import trimmed_state  # noqa: E402
 
 LONG = [0.02 * i for i in range(1000)]  # values of a sweep of half a minute
 TURN = {"airspeed": 12.0, "climb_rate": 1.0, "sideslip": 0.1, "turn_rate": 0.2}
@@ -376,7 +378,8 @@ def test_an_error_of_ours_is_told_and_ends_nothing(monkeypatch, aircraft):
         raise RuntimeError("nobody thought of this")
 
     rclpy.init(domain_id=next(DOMAINS))
-    node = analysis.Analysis(aircraft)
+    flight = Simulation(aircraft, trimmed_state(aircraft, trim(aircraft)), trim(aircraft).swashplate)
+    node = analysis.Analysis(FlightLoop(flight))
     try:
         monkeypatch.setattr(analysis, "linearize", broken)
         answer = node._on_linearize(Linearize.Request(), Linearize.Response())

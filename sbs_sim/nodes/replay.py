@@ -388,6 +388,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 def _replay(options: argparse.Namespace) -> int:
     """Play until the end of the log or an interruption."""
+    _refuse_damaged(options.file)
     ended = threading.Event()
     part = (options.start, options.end)
     return run(
@@ -395,6 +396,16 @@ def _replay(options: argparse.Namespace) -> int:
         sys.argv[:1],
         ended,
     )
+
+
+def _refuse_damaged(path: Path) -> None:
+    """Raise RecordingError for a log that is not whole; one of another writer, without checksums, is taken as it is."""
+    try:
+        log = read(path)
+    except RecordingError:
+        return
+    if not log.complete:
+        raise RecordingError(f"{path} is not whole ({log.reasons[0]}): `replay --recover {path}` saves what is")
 
 
 def _recover(path: Path, output: str) -> int:

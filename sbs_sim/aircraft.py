@@ -371,9 +371,10 @@ class Aircraft:
             body=np.array([mass, *first, *inertia.ravel()]),
             switches=np.zeros(P.SWITCH_COUNT, dtype=np.int64),
             first_blade=np.cumsum([0, *(rotor.blades for rotor in self.rotors)]).astype(np.int64),
+            first_block=np.cumsum([0, *(-(-rotor.blades // P.LANES) for rotor in self.rotors)]).astype(np.int64),
             rotor=np.stack([self._rotor_row(rotor) for rotor in self.rotors]),
             axes=np.stack([hub_axes(rotor.shaft_direction) for rotor in self.rotors]),
-            element=np.stack([_filled_up(rotor.elements(self.options.elements)) for rotor in self.rotors]),
+            element=np.stack([_chunks(rotor.elements(self.options.elements)) for rotor in self.rotors]),
             cells=np.concatenate(tables),
             grid_index=index,
             grid=grid,
@@ -402,6 +403,10 @@ class Aircraft:
         row[P.HUB_X : P.HUB_Z + 1] = rotor.hub
         spacing = 2 * math.pi / rotor.blades
         row[P.COS_SPACING], row[P.SIN_SPACING] = math.cos(spacing), math.sin(spacing)
+        row[P.INVERSE_BLADES], row[P.INVERSE_TIP_SPEED] = 1 / rotor.blades, 1 / (rotor.speed * rotor.radius)
+        density, tip_speed = self.environment.air_density, rotor.speed * rotor.radius
+        # in vacuum the coefficients are zero, not zero over zero
+        row[P.LOAD_SCALE] = 1 / (density * math.pi * rotor.radius**2 * tip_speed**2) if density > 0 else 0.0
         return row
 
 
@@ -599,25 +604,31 @@ def _covers_circle(path: Path) -> bool:
 
 def _airfoil_grids(aircraft: Aircraft, first_rows: dict[str, int]) -> tuple[P.IntArray, Array]:
     """`grid_index` and `grid` of Params, with the first row of each airfoil in `cells`."""
-    most = max(len(table.reynolds) for table in aircraft.airfoils.values())
-    index = np.zeros((len(aircraft.rotors), 3), dtype=np.int64)
-    grid = np.zeros((len(aircraft.rotors), 2 + most))
+    most = max(len(table.reynolds) - 1 for table in aircraft.airfoils.values())
+    most += -most % P.KNOT_GROUP
+    elements = aircraft.options.elements + -aircraft.options.elements % P.REGISTER
+    index = np.zeros((len(aircraft.rotors), 4), dtype=np.int64)
+    grid = np.zeros((len(aircraft.rotors), 2 + 2 * most))
     for j, rotor in enumerate(aircraft.rotors):
         table = aircraft.airfoils[rotor.airfoil]
-        knots = len(table.reynolds)
+        count = len(table.reynolds) - 1
         n_alpha, alpha0, inverse_step = cell_grid(table)
-        index[j] = first_rows[rotor.airfoil], n_alpha, knots
+        index[j] = first_rows[rotor.airfoil], n_alpha, count, elements
         grid[j, :2] = alpha0, inverse_step
-        grid[j, 2 : 2 + knots] = table.reynolds
+        widths = np.diff(table.reynolds)
+        grid[j, 2 : 2 + count] = 1 / widths
+        grid[j, 2 + most : 2 + most + count] = table.reynolds[:-1] / widths
     return index, grid
 
 
-def _filled_up(elements: Array) -> Array:
-    """Elements with copies of the last one, but without area, up to a whole number of vector registers."""
-    missing = -elements.shape[1] % P.REGISTER
+def _chunks(elements: Array) -> Array:
+    """Elements of a blade in chunks, shape (n_chunks, ELEMENT_SIZE), filled up with copies of the last without area."""
+    rows, count = elements.shape
+    missing = -count % P.CHUNK
     fill = np.repeat(elements[:, -1:], missing, axis=1)
-    fill[P.HALF_AREA] = 0.0
-    return np.ascontiguousarray(np.concatenate([elements, fill], axis=1))
+    fill[P.HALF_AREA // P.CHUNK] = 0.0
+    chunks = np.concatenate([elements, fill], axis=1).reshape(rows, -1, P.CHUNK)
+    return np.ascontiguousarray(chunks.swapaxes(0, 1).reshape(-1, P.ELEMENT_SIZE))
 
 
 def _blades_inertia(rotor: Rotor) -> Array:

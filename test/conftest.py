@@ -1,6 +1,11 @@
 """Fixtures of the physics tests: the aircraft that come with the package and their hovers."""
 
 import pytest
+from hypothesis import settings
+
+# How long one example takes says more about the machine than about the code.
+settings.register_profile("no_deadline", deadline=None)
+settings.load_profile("no_deadline")
 
 
 @pytest.fixture(scope="session")

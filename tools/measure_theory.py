@@ -20,7 +20,7 @@ from sbs_sim.analysis.floquet import floquet
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.two_loop import _TwoLoops
 from sbs_sim.errors import TrimError
-from sbs_sim.model.arctangent import arctangent2
+from sbs_sim.model.trigonometry import arctangent2
 
 FORWARD, FASTEST, STEP = 15.0, 30.0, 0.5  # m/s
 ONLY_FLAP = {"lead_lag": False, "cyclic_inflow": False}

@@ -310,7 +310,7 @@ def write_table(path: str | Path, table: AirfoilTable, comments: Sequence[str] =
 
 
 def cells(table: AirfoilTable) -> Array:
-    """Coefficients of the bilinear interpolation in every cell of a table, for `coefficients_at`.
+    """Coefficients of the bilinear interpolation in every cell of a table, for `coefficients_in`.
 
     Within a cell, with x and y in 0..1 the fractions along angle and Reynolds number,
     cl = c0 + c1 x + c2 y + c3 x y and cd = c4 + c5 x + c6 y + c7 x y.
@@ -355,31 +355,28 @@ def cell_grid(table: AirfoilTable) -> tuple[int, float, float]:
 
 
 @kernel
-def coefficients_at(cells, first_row, n_alpha, n_re, re_place, alpha_place):
-    """Lift and drag coefficient at a place in a table, bilinear.
+def cell_of(place, count):
+    """Number of the cell in which a place lies, as a float: the last of `count` at its far end, and for NaN."""
+    # A comparison with NaN is false; what its conversion gives is then not used.
+    return float(np.int32(place)) if place < count else count - 1.0
+
+
+@kernel
+def coefficients_in(cells, row, x, y):
+    """Lift and drag coefficient within a cell.
 
     Parameters
     ----------
     cells : ndarray, shape (n, 8)
         `cells` of one or more tables, one after the other.
-    first_row : int
-        First row of the table.
-    n_alpha, n_re : int
-        Cells along the angle (`cell_grid`), Reynolds numbers of the table.
-    re_place, alpha_place : float
-        Distance from the first knot in cells, 0 to n_re - 1 and 0 to n_alpha: see `clamp`. NaN reads inside as well
-        and gives NaN.
+    row : unsigned int
+    x, y : float
+        Fractions along angle and Reynolds number, 0 to 1.
 
     Returns
     -------
     cl, cd : float
     """
-    # A comparison with NaN is false: the cell is then the last one, and the fractions stay NaN.
-    i = int(re_place) if re_place < n_re - 1 else n_re - 2
-    j = int(alpha_place) if alpha_place < n_alpha else n_alpha - 1
-    y = re_place - i
-    x = alpha_place - j
-    row = first_row + i * n_alpha + j
     cl = cells[row, 0] + cells[row, 1] * x + (cells[row, 2] + cells[row, 3] * x) * y
     cd = cells[row, 4] + cells[row, 5] * x + (cells[row, 6] + cells[row, 7] * x) * y
     return cl, cd

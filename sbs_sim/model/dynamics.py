@@ -9,17 +9,19 @@ The unknowns of the body are the specific force of the c.g. (acceleration minus 
 one place only and free fall is exact) and the angular acceleration.
 """
 
-import math
-
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
-from sbs_sim.model.blade import add_inertia, blade_terms
+from sbs_sim.model.blade import air_moments, blade_motion, blade_terms, block_inertia, paper_moments
 from sbs_sim.model.duct import duct_thrust
 from sbs_sim.model.frames import cross, quaternion_rates, rotation_rows
 from sbs_sim.model.fuselage import plate_drag
 from sbs_sim.model.inflow import inflow_rates
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_blade_acceleration, add_rotation_terms, blade_angle
+from sbs_sim.model.section import section_loads
+from sbs_sim.model.trigonometry import cosine_sine
+
+LANES = P.LANES
 
 
 @entry
@@ -127,8 +129,7 @@ def _rotor_terms(p, j, x, swash, psi, air, om, g, work):
     """Work rows of the blades of rotor j, and the sums over them that the inflow and the inertia need."""
     rotor = p.rotor[j]
     a = p.axes[j]
-    hub = (rotor[P.HUB_X], rotor[P.HUB_Y], rotor[P.HUB_Z])
-    spin = cross(om[0], om[1], om[2], hub[0], hub[1], hub[2])
+    spin = cross(om[0], om[1], om[2], rotor[P.HUB_X], rotor[P.HUB_Y], rotor[P.HUB_Z])
     flow = _to_hub(a, air[0] + spin[0], air[1] + spin[1], air[2] + spin[2])
     rates = _to_hub(a, om[0], om[1], om[2])
     if p.switches[P.COMPLETE_COUPLING] == 1:
@@ -139,56 +140,59 @@ def _rotor_terms(p, j, x, swash, psi, air, om, g, work):
         base = _to_hub(a, -g[0], -g[1], -g[2])
         hang = base
     work.hub_flow[j, 0], work.hub_flow[j, 1], work.hub_flow[j, 2] = flow
+    _set_blades(p, j, x, swash[j], psi, work)
+    induced = rotor[P.SPEED] * rotor[P.RADIUS] * x[S.BODY_SIZE + 4 * p.first_blade[-1] + 3 * j]
+    blades = p.first_blade[j + 1] - p.first_blade[j]
+    aero, inertia = work.aero[j], work.rotor_inertia[j]
+    aero[:] = 0.0
+    inertia[:] = 0.0
+    for i in range(p.first_block[j], p.first_block[j + 1]):
+        row = work.blade[i]
+        blade_motion(p, j, row, induced, flow, rates)
+        section_loads(p, j, row, min(LANES, blades), work.strip, work.cell)
+        blade_terms(p, j, row, rates, base, hang)
+        _add(air_moments(p, j, row), aero)
+        _add(block_inertia(p, j, row), inertia)
+        if p.switches[P.COMPLETE_HUB_MOMENT] == 0:
+            paper_moments(p, j, row)
+        blades -= LANES
 
-    all_blades = p.first_blade[-1]
-    first = p.first_blade[j]
+
+@kernel
+def _add(values, total):
+    """Add a tuple to an array."""
+    for i in range(len(values)):
+        total[i] += values[i]
+
+
+@kernel
+def _set_blades(p, j, x, swash, psi, work):
+    """Azimuth, flap, lag, pitch and inflow gradient of the blades of rotor j in their work rows."""
+    rotor = p.rotor[j]
+    all_blades, first = p.first_blade[-1], p.first_blade[j]
     n_blades = p.first_blade[j + 1] - first
     flap, flap_rate = S.BODY_SIZE + first, S.BODY_SIZE + all_blades + first
     lag, lag_rate = S.BODY_SIZE + 2 * all_blades + first, S.BODY_SIZE + 3 * all_blades + first
     inflow = S.BODY_SIZE + 4 * all_blades + 3 * j
-    lambda0, lambdas, lambdac = x[inflow], x[inflow + 1], x[inflow + 2]
-    lead_lag, cyclic = p.switches[P.LEAD_LAG], p.switches[P.CYCLIC_INFLOW]
     omega = rotor[P.SPEED]
-    work.rotor_inertia[j, :] = 0.0
-    thrust = sine_moment = cosine_moment = 0.0
-    cosine, sine = math.cos(psi), math.sin(psi)
-    step_c, step_s = rotor[P.COS_SPACING], rotor[P.SIN_SPACING]
+    scale = omega * p.switches[P.CYCLIC_INFLOW]
+    lambdas, lambdac = scale * x[inflow + 1], scale * x[inflow + 2]
+    cosine, sine = cosine_sine(psi)
     for k in range(n_blades):
-        row = work.blade[first + k]
+        row, i = work.blade[p.first_block[j] + k // LANES], k % LANES
         beta, beta_rate = blade_angle(x, flap, flap_rate, n_blades, k, cosine, sine, omega)
         xi = xi_rate = 0.0
-        if lead_lag == 1:
+        if p.switches[P.LEAD_LAG] == 1:
             xi, xi_rate = blade_angle(x, lag, lag_rate, n_blades, k, cosine, sine, omega)
-        row[P.COSINE], row[P.SINE] = cosine, sine
-        row[P.FLAP_ANGLE], row[P.LAG_ANGLE] = beta, xi
-        pitch = _pitch(rotor, swash[j], cosine, sine) - rotor[P.PITCH_FLAP] * beta - rotor[P.PITCH_LAG] * xi
-        gradient = cyclic * omega * (lambdac * cosine + lambdas * sine)
-        induced = omega * rotor[P.RADIUS] * lambda0
-        lift, c, s, p1, p2, cb, sb = blade_terms(
-            p,
-            j,
-            row,
-            work.strip,
-            beta,
-            beta_rate,
-            xi,
-            xi_rate,
-            cosine,
-            sine,
-            pitch,
-            induced,
-            gradient,
-            flow,
-            rates,
-            base,
-            hang,
+        pitch = _pitch(rotor, swash, cosine, sine) - rotor[P.PITCH_FLAP] * beta - rotor[P.PITCH_LAG] * xi
+        row[P.COSINE + i], row[P.SINE + i] = cosine, sine
+        row[P.FLAP_ANGLE + i], row[P.FLAP_RATE + i] = beta, beta_rate
+        row[P.LAG_ANGLE + i], row[P.LAG_RATE + i] = xi, xi_rate
+        row[P.PITCH + i], row[P.INFLOW_GRADIENT + i] = pitch, lambdac * cosine + lambdas * sine
+        cosine, sine = (
+            cosine * rotor[P.COS_SPACING] - sine * rotor[P.SIN_SPACING],
+            sine * rotor[P.COS_SPACING] + cosine * rotor[P.SIN_SPACING],
         )
-        add_inertia(p, j, work.rotor_inertia[j], c, s, p1, p2, cb, sb)
-        thrust += lift
-        sine_moment += row[P.NORMAL_MOMENT] * sine
-        cosine_moment += row[P.NORMAL_MOMENT] * cosine
-        cosine, sine = cosine * step_c - sine * step_s, sine * step_c + cosine * step_s
-    work.aero[j, 0], work.aero[j, 1], work.aero[j, 2] = thrust, sine_moment, cosine_moment
 
 
 @kernel
@@ -246,27 +250,106 @@ def _solve_with_blades(p, work):
     """Specific force and angular acceleration of the body with all blades eliminated (`complete`)."""
     k, b = work.matrix, work.vector
     _rigid_matrix(p, work)
-    lead_lag = p.switches[P.LEAD_LAG]
     for j in range(p.rotor.shape[0]):
         inverse_a1 = 1.0 / p.rotor[j, P.A1]
-        for i in range(p.first_blade[j], p.first_blade[j + 1]):
-            row = work.blade[i]
-            for m in range(6):
-                b[m] += row[P.BASE_LOAD + m]
-            _eliminate(k, b, row, P.FLAP_COUPLING, row[P.FLAP_MOMENT], inverse_a1)
-            if lead_lag == 1:
-                _eliminate(k, b, row, P.LAG_COUPLING, row[P.LAG_MOMENT], 1.0 / row[P.A2])
+        for block in range(p.first_block[j], p.first_block[j + 1]):
+            _eliminate(k, b, work.blade[block], inverse_a1, 1.0 * p.switches[P.LEAD_LAG])
     _solve_symmetric(k, b)
 
 
 @kernel
-def _eliminate(k, b, row, at, moment, inverse_inertia):
-    """Take one hinge coordinate out of the body's system; only the lower triangle is kept."""
-    for m in range(6):
-        scaled = row[at + m] * inverse_inertia
-        b[m] -= scaled * moment
-        for n in range(m + 1):
-            k[m, n] -= scaled * row[at + n]
+def _eliminate(k, b, row, inverse_a1, lead_lag):
+    """Take the hinge coordinates of a block of blades out of the body's system; only the lower triangle is kept."""
+    b0 = b1 = b2 = b3 = b4 = b5 = 0.0
+    k00 = k10 = k11 = k20 = k21 = k22 = k30 = k31 = k32 = k33 = 0.0
+    k40 = k41 = k42 = k43 = k44 = k50 = k51 = k52 = k53 = k54 = k55 = 0.0
+    for i in range(LANES):
+        f0, f1, f2, f3, f4, f5 = _six(row, P.FLAP_COUPLING + i)
+        g0, g1, g2, g3, g4, g5 = _six(row, P.LAG_COUPLING + i)
+        h0, h1, h2, h3, h4, h5 = _six(row, P.BASE_LOAD + i)
+        inverse_a2 = lead_lag * row[P.INVERSE_A2 + i]
+        flap, lag = inverse_a1 * row[P.FLAP_MOMENT + i], inverse_a2 * row[P.LAG_MOMENT + i]
+        b0 += h0 - f0 * flap - g0 * lag
+        b1 += h1 - f1 * flap - g1 * lag
+        b2 += h2 - f2 * flap - g2 * lag
+        b3 += h3 - f3 * flap - g3 * lag
+        b4 += h4 - f4 * flap - g4 * lag
+        b5 += h5 - f5 * flap - g5 * lag
+        d0, d1, d2, d3, d4, d5 = (
+            f0 * inverse_a1,
+            f1 * inverse_a1,
+            f2 * inverse_a1,
+            f3 * inverse_a1,
+            f4 * inverse_a1,
+            f5 * inverse_a1,
+        )
+        e0, e1, e2, e3, e4, e5 = (
+            g0 * inverse_a2,
+            g1 * inverse_a2,
+            g2 * inverse_a2,
+            g3 * inverse_a2,
+            g4 * inverse_a2,
+            g5 * inverse_a2,
+        )
+        k00 += d0 * f0 + e0 * g0
+        k10 += d1 * f0 + e1 * g0
+        k11 += d1 * f1 + e1 * g1
+        k20 += d2 * f0 + e2 * g0
+        k21 += d2 * f1 + e2 * g1
+        k22 += d2 * f2 + e2 * g2
+        k30 += d3 * f0 + e3 * g0
+        k31 += d3 * f1 + e3 * g1
+        k32 += d3 * f2 + e3 * g2
+        k33 += d3 * f3 + e3 * g3
+        k40 += d4 * f0 + e4 * g0
+        k41 += d4 * f1 + e4 * g1
+        k42 += d4 * f2 + e4 * g2
+        k43 += d4 * f3 + e4 * g3
+        k44 += d4 * f4 + e4 * g4
+        k50 += d5 * f0 + e5 * g0
+        k51 += d5 * f1 + e5 * g1
+        k52 += d5 * f2 + e5 * g2
+        k53 += d5 * f3 + e5 * g3
+        k54 += d5 * f4 + e5 * g4
+        k55 += d5 * f5 + e5 * g5
+    b[0] += b0
+    b[1] += b1
+    b[2] += b2
+    b[3] += b3
+    b[4] += b4
+    b[5] += b5
+    k[0, 0] = k[0, 0] - k00
+    k[1, 0], k[1, 1] = k[1, 0] - k10, k[1, 1] - k11
+    k[2, 0], k[2, 1], k[2, 2] = k[2, 0] - k20, k[2, 1] - k21, k[2, 2] - k22
+    k[3, 0], k[3, 1], k[3, 2], k[3, 3] = k[3, 0] - k30, k[3, 1] - k31, k[3, 2] - k32, k[3, 3] - k33
+    k[4, 0], k[4, 1], k[4, 2], k[4, 3], k[4, 4] = (
+        k[4, 0] - k40,
+        k[4, 1] - k41,
+        k[4, 2] - k42,
+        k[4, 3] - k43,
+        k[4, 4] - k44,
+    )
+    k[5, 0], k[5, 1], k[5, 2], k[5, 3], k[5, 4], k[5, 5] = (
+        k[5, 0] - k50,
+        k[5, 1] - k51,
+        k[5, 2] - k52,
+        k[5, 3] - k53,
+        k[5, 4] - k54,
+        k[5, 5] - k55,
+    )
+
+
+@kernel
+def _six(row, at):
+    """A six-vector of one lane."""
+    return (
+        row[at],
+        row[at + LANES],
+        row[at + 2 * LANES],
+        row[at + 3 * LANES],
+        row[at + 4 * LANES],
+        row[at + 5 * LANES],
+    )
 
 
 @kernel
@@ -305,49 +388,49 @@ def _rigid_matrix(p, work):
 
 @kernel
 def _solve_symmetric(k, b):
-    """Solve k x = b in place for a symmetric positive definite k by L D L^T; lower triangle is read."""
-    for m in range(6):
-        for n in range(m):
-            value = k[m, n]
-            for i in range(n):
-                value -= k[m, i] * k[n, i] * k[i, i]
-            k[m, n] = value / k[n, n]
-        value = k[m, m]
-        for i in range(m):
-            value -= k[m, i] * k[m, i] * k[i, i]
-        k[m, m] = value
-        for i in range(m):
-            b[m] -= k[m, i] * b[i]
-    for m in range(6):
-        b[m] /= k[m, m]
+    """Solve k x = b in place for a symmetric positive definite k by L D L^T; only its lower triangle is used."""
+    for n in range(6):
+        k[n, n] = 1.0 / k[n, n]
+        for m in range(n + 1, 6):
+            factor = k[m, n] * k[n, n]
+            b[m] -= factor * b[n]
+            for i in range(n + 1, m + 1):
+                k[m, i] -= factor * k[i, n]
     for m in range(5, -1, -1):
         for i in range(m + 1, 6):
             b[m] -= k[i, m] * b[i]
+        b[m] *= k[m, m]
 
 
 @kernel
 def _solve_blades(p, work):
     """Flap and lag accelerations of every blade under the body's motion (`complete`)."""
     b = work.vector
+    b0, b1, b2, b3, b4, b5 = b[0], b[1], b[2], b[3], b[4], b[5]
     for j in range(p.rotor.shape[0]):
-        for i in range(p.first_blade[j], p.first_blade[j + 1]):
-            row = work.blade[i]
-            flap, lag = row[P.FLAP_MOMENT], row[P.LAG_MOMENT]
-            for m in range(6):
-                flap -= row[P.FLAP_COUPLING + m] * b[m]
-                lag -= row[P.LAG_COUPLING + m] * b[m]
-            row[P.FLAP_ACCELERATION] = flap / p.rotor[j, P.A1]
-            row[P.LAG_ACCELERATION] = lag / row[P.A2] * p.switches[P.LEAD_LAG]
+        inverse_a1, lead_lag = 1.0 / p.rotor[j, P.A1], 1.0 * p.switches[P.LEAD_LAG]
+        for block in range(p.first_block[j], p.first_block[j + 1]):
+            row = work.blade[block]
+            for i in range(LANES):
+                f, g = P.FLAP_COUPLING + i, P.LAG_COUPLING + i
+                flap = row[P.FLAP_MOMENT + i] - row[f] * b0 - row[f + LANES] * b1 - row[f + 2 * LANES] * b2
+                flap -= row[f + 3 * LANES] * b3 + row[f + 4 * LANES] * b4 + row[f + 5 * LANES] * b5
+                lag = row[P.LAG_MOMENT + i] - row[g] * b0 - row[g + LANES] * b1 - row[g + 2 * LANES] * b2
+                lag -= row[g + 3 * LANES] * b3 + row[g + 4 * LANES] * b4 + row[g + 5 * LANES] * b5
+                row[P.FLAP_ACCELERATION + i] = flap * inverse_a1
+                row[P.LAG_ACCELERATION + i] = lag * row[P.INVERSE_A2 + i] * lead_lag
 
 
 @kernel
 def _solve_blades_alone(p, work):
     """Flap and lag accelerations of every blade on a hub that does not accelerate (`paper`)."""
     for j in range(p.rotor.shape[0]):
-        for i in range(p.first_blade[j], p.first_blade[j + 1]):
-            row = work.blade[i]
-            row[P.FLAP_ACCELERATION] = row[P.FLAP_MOMENT] / p.rotor[j, P.A1]
-            row[P.LAG_ACCELERATION] = row[P.LAG_MOMENT] / row[P.A2] * p.switches[P.LEAD_LAG]
+        inverse_a1, lead_lag = 1.0 / p.rotor[j, P.A1], 1.0 * p.switches[P.LEAD_LAG]
+        for block in range(p.first_block[j], p.first_block[j + 1]):
+            row = work.blade[block]
+            for i in range(LANES):
+                row[P.FLAP_ACCELERATION + i] = row[P.FLAP_MOMENT + i] * inverse_a1
+                row[P.LAG_ACCELERATION + i] = row[P.LAG_MOMENT + i] * row[P.INVERSE_A2 + i] * lead_lag
 
 
 @kernel
@@ -358,11 +441,12 @@ def _hold_coordinates(p, x, work):
         first = p.first_blade[j]
         n_blades = p.first_blade[j + 1] - first
         flap, lag, omega = S.BODY_SIZE + first, S.BODY_SIZE + 2 * all_blades + first, p.rotor[j, P.SPEED]
-        for i in range(first, first + n_blades):
-            row = work.blade[i]
-            c, s = row[P.COSINE], row[P.SINE]
-            row[P.FLAP_ACCELERATION] = _steady_acceleration(x, flap, n_blades, c, s, omega)
-            row[P.LAG_ACCELERATION] = _steady_acceleration(x, lag, n_blades, c, s, omega) * p.switches[P.LEAD_LAG]
+        for k in range(n_blades):
+            row, i = work.blade[p.first_block[j] + k // LANES], k % LANES
+            c, s = row[P.COSINE + i], row[P.SINE + i]
+            held = _steady_acceleration(x, lag, n_blades, c, s, omega) * p.switches[P.LEAD_LAG]
+            row[P.FLAP_ACCELERATION + i] = _steady_acceleration(x, flap, n_blades, c, s, omega)
+            row[P.LAG_ACCELERATION + i] = held
 
 
 @kernel
@@ -386,13 +470,8 @@ def _hub_loads(p, work):
     for j in range(p.rotor.shape[0]):
         out = work.loads[j]
         out[:] = 0.0
-        for i in range(p.first_blade[j], p.first_blade[j + 1]):
-            row = work.blade[i]
-            flap, lag = row[P.FLAP_ACCELERATION], row[P.LAG_ACCELERATION]
-            for m in range(6):
-                out[P.FORCE + m] += (
-                    row[P.BASE_LOAD + m] - row[P.FLAP_COUPLING + m] * flap - row[P.LAG_COUPLING + m] * lag
-                )
+        for block in range(p.first_block[j], p.first_block[j + 1]):
+            _add_blade_loads(work.blade[block], out)
         if complete:
             _subtract_carried_blades(work.rotor_inertia[j], b, out)
         hx, hy, hz = p.rotor[j, P.HUB_X], p.rotor[j, P.HUB_Y], p.rotor[j, P.HUB_Z]
@@ -405,6 +484,21 @@ def _hub_loads(p, work):
         axial = a[0, 2] * out[P.MOMENT] + a[1, 2] * out[P.MOMENT + 1] + a[2, 2] * out[P.MOMENT + 2]
         out[P.THRUST] = work.aero[j, 0]
         out[P.TORQUE] = p.rotor[j, P.SENSE] * axial
+
+
+@kernel
+def _add_blade_loads(row, out):
+    """Add the loads of a block of blades on their hub, about the c.g."""
+    for m in range(6):
+        load = 0.0
+        for i in range(LANES):
+            at = m * LANES + i
+            load += (
+                row[P.BASE_LOAD + at]
+                - row[P.FLAP_COUPLING + at] * row[P.FLAP_ACCELERATION + i]
+                - row[P.LAG_COUPLING + at] * row[P.LAG_ACCELERATION + i]
+            )
+        out[P.FORCE + m] += load
 
 
 @kernel
@@ -429,11 +523,11 @@ def _paper_hub_moment(p, j, work):
     inertia = p.rotor[j, P.A1_HUB] * p.switches[P.LEAD_LAG]
     for m in range(3):
         out[P.MOMENT + m] = axial * a[m, 2]
-    for i in range(p.first_blade[j], p.first_blade[j + 1]):
-        row = work.blade[i]
+    for k in range(p.first_blade[j + 1] - p.first_blade[j]):
+        row, i = work.blade[p.first_block[j] + k // LANES], k % LANES
         for m in range(3):
-            inertial = inertia * row[P.FLAP_ACCELERATION] * row[P.FLAP_AXIS + m]
-            out[P.MOMENT + m] += row[P.PAPER_MOMENT + m] - inertial
+            inertial = inertia * row[P.FLAP_ACCELERATION + i] * row[P.FLAP_AXIS + m * LANES + i]
+            out[P.MOMENT + m] += row[P.PAPER_MOMENT + m * LANES + i] - inertial
 
 
 @kernel
@@ -503,12 +597,13 @@ def _rotor_rates(p, x, work, dx):
         rotor = p.rotor[j]
         first = p.first_blade[j]
         n_blades = p.first_blade[j + 1] - first
-        omega = rotor[P.SPEED]
+        omega, share = rotor[P.SPEED], rotor[P.INVERSE_BLADES]
         for k in range(n_blades):
-            row = work.blade[first + k]
-            c, s = row[P.COSINE], row[P.SINE]
-            add_blade_acceleration(dx, flap_rates + first, n_blades, k, c, s, row[P.FLAP_ACCELERATION])
-            add_blade_acceleration(dx, lag_rates + first, n_blades, k, c, s, row[P.LAG_ACCELERATION])
+            row, i = work.blade[p.first_block[j] + k // LANES], k % LANES
+            c, s = row[P.COSINE + i], row[P.SINE + i]
+            flap, lag = share * row[P.FLAP_ACCELERATION + i], share * row[P.LAG_ACCELERATION + i]
+            add_blade_acceleration(dx, flap_rates + first, n_blades, k, c, s, flap)
+            add_blade_acceleration(dx, lag_rates + first, n_blades, k, c, s, lag)
         add_rotation_terms(x, dx, flaps + first, flap_rates + first, n_blades, omega, 1.0)
         add_rotation_terms(x, dx, lags + first, lag_rates + first, n_blades, omega, 1.0 * lead_lag)
         _inflow(p, j, x, work, dx)
@@ -519,24 +614,20 @@ def _inflow(p, j, x, work, dx):
     """Inflow rates of rotor j from the sums of its blades."""
     rotor = p.rotor[j]
     at = S.BODY_SIZE + 4 * p.first_blade[-1] + 3 * j
-    radius, omega = rotor[P.RADIUS], rotor[P.SPEED]
-    tip = omega * radius
+    inverse_tip, scale = rotor[P.INVERSE_TIP_SPEED], rotor[P.LOAD_SCALE]
     flow = work.hub_flow[j]
-    # in vacuum the coefficients are zero, not zero over zero
-    density = p.air[P.DENSITY]
-    scale = 0.0 if density <= 0.0 else 1.0 / (density * math.pi * radius * radius * tip * tip)
     dx[at], dx[at + 1], dx[at + 2] = inflow_rates(
         x[at],
         x[at + 1],
         x[at + 2],
-        flow[0] / tip,
-        flow[1] / tip,
-        flow[2] / tip,
+        flow[0] * inverse_tip,
+        flow[1] * inverse_tip,
+        flow[2] * inverse_tip,
         rotor[P.SENSE],
         rotor[P.DUCT],
-        omega,
+        rotor[P.SPEED],
         work.aero[j, 0] * scale,
-        work.aero[j, 1] * scale / radius,
-        work.aero[j, 2] * scale / radius,
+        work.aero[j, 1] * scale / rotor[P.RADIUS],
+        work.aero[j, 2] * scale / rotor[P.RADIUS],
         p.switches[P.CYCLIC_INFLOW],
     )

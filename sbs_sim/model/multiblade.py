@@ -64,9 +64,11 @@ def blade_angle(x, angles, rates, n_blades, blade, cosine, sine, speed):
 
 
 @kernel
-def add_blade_acceleration(dx, rates, n_blades, blade, cosine, sine, acceleration):
-    """Add what one blade's acceleration [rad/s^2] gives to the accelerations of the coordinates."""
-    share = acceleration / n_blades
+def add_blade_acceleration(dx, rates, n_blades, blade, cosine, sine, share):
+    """Add what one blade gives to the accelerations of the coordinates.
+
+    share: acceleration of the blade [rad/s^2] over the number of blades; cosine and sine are those of its azimuth.
+    """
     dx[rates] += share
     cn, sn = cosine, sine
     for n in range(1, (n_blades - 1) // 2 + 1):

@@ -49,18 +49,23 @@ BODY_SIZE = 13
     HUB_Z,
     COS_SPACING,  # angle between neighbouring blades, 2 pi / N_b
     SIN_SPACING,
-) = range(23)
-ROTOR_SIZE = 23
+    INVERSE_BLADES,  # 1 / N_b
+    INVERSE_TIP_SPEED,
+    LOAD_SCALE,  # of C_T: 1 / (rho pi R^2 (Omega R)^2), 0 in vacuum
+) = range(26)
+ROTOR_SIZE = 26
 
-# element: rows per rotor; the last axis runs along the blade
-SPAN, CHORD, HALF_AREA, LIFT_FRACTION, TWIST = range(5)
-ELEMENT_ROWS = 5
-
-# Elements are worked on in chunks of this many; a vector register holds four or eight of them, and a blade is filled
-# up with elements without area to whole registers.
+# Blades are worked on in blocks of one rotor, as lanes of vector registers; their elements in chunks, and a blade is
+# filled up with elements without area to whole registers. Reynolds numbers are placed in a table some knots at a time.
+LANES = 4
 CHUNK = 64
 REGISTER = 8
 STRIP_ROWS = 6
+KNOT_GROUP = 8
+
+# element: rows of a chunk of elements along a blade, CHUNK values each
+SPAN, CHORD, HALF_AREA, LIFT_FRACTION, TWIST = range(0, 5 * CHUNK, CHUNK)
+ELEMENT_SIZE = 5 * CHUNK
 
 # loads: columns of one rotor's outputs; forces and moments in body axes about the hub centre
 THRUST, TORQUE, FORCE, MOMENT = 0, 1, 2, 5
@@ -76,25 +81,28 @@ class Params(NamedTuple):
     body : ndarray, shape (BODY_SIZE,)
         The rigid part: the fuselage without blades (`complete` coupling) or the whole aircraft (`paper`).
     switches : ndarray of int64, shape (SWITCH_COUNT,)
-    first_blade : ndarray of int64, shape (n_rotors + 1,)
-        Index of each rotor's first blade among all blades; the last entry is the number of blades.
+    first_blade, first_block : ndarray of int64, shape (n_rotors + 1,)
+        Index of each rotor's first blade and block of blades among all; the last entry is their number.
     rotor : ndarray, shape (n_rotors, ROTOR_SIZE)
     axes : ndarray, shape (n_rotors, 3, 3)
         Hub axes as columns in body components.
-    element : ndarray, shape (n_rotors, ELEMENT_ROWS, n_elements)
+    element : ndarray, shape (n_rotors, n_chunks, ELEMENT_SIZE)
         Distance from the flap hinge [m], chord [m], c ds / 2 [m^2], lift fraction (tip loss), twist [rad].
     cells : ndarray, shape (n_cells, 8)
         Bilinear coefficients of every airfoil table cell, see `sbs_sim.model.airfoil.cells`.
-    grid_index : ndarray of int64, shape (n_rotors, 3)
-        First row in `cells`, number of angle cells, number of Reynolds knots of the rotor's airfoil.
-    grid : ndarray, shape (n_rotors, 2 + most Reynolds knots)
-        First angle [rad], inverse angle step [1/rad], Reynolds knots.
+    grid_index : ndarray of int64, shape (n_rotors, 4)
+        First row in `cells`, the number of cells along angle and Reynolds number of the rotor's airfoil, and the number
+        of elements of a blade, filled up to whole registers.
+    grid : ndarray, shape (n_rotors, 2 + 2 n)
+        First angle [rad], inverse angle step [1/rad], then of each Reynolds cell the inverse width and, after those of
+        all cells, the lower knot over the width; zeros fill up whole groups of KNOT_GROUP.
     """
 
     air: Array
     body: Array
     switches: IntArray
     first_blade: IntArray
+    first_block: IntArray
     rotor: Array
     axes: Array
     element: Array
@@ -103,13 +111,42 @@ class Params(NamedTuple):
     grid: Array
 
 
-# blade: columns of the work row of one blade; six-vectors are force and moment, body axes, about the c.g.
-FLAP_COUPLING, LAG_COUPLING, BASE_LOAD = 0, 6, 12  # what a unit beta'', xi'' takes, and the load without them
-FLAP_MOMENT, LAG_MOMENT, A2, COSINE, SINE, FLAP_ANGLE, LAG_ANGLE = range(18, 25)
-FLAP_ACCELERATION, LAG_ACCELERATION, NORMAL_MOMENT = range(25, 28)
-PAPER_MOMENT = 28  # moment about the hub in the paper's reading without its inertial part, body axes
-FLAP_AXIS = 31  # unit vector f, body axes
-BLADE_SIZE = 34
+# blade: rows of the work of a block of blades, LANES values each; six-vectors are force and moment, body axes, about
+# the c.g., and take six rows
+(
+    IS_BLADE,  # 1 in lanes with a blade, 0 in those that fill up a block; set once
+    COSINE,  # of the azimuth
+    SINE,
+    FLAP_ANGLE,
+    FLAP_RATE,
+    LAG_ANGLE,
+    LAG_RATE,
+    PITCH,  # at the root
+    INFLOW_GRADIENT,  # of the induced velocity along the blade [1/s]
+    COS_FLAP,
+    SIN_FLAP,
+    COS_LAG,
+    SIN_LAG,
+    COS_SPAN,  # of the azimuth of the line from lag to flap hinge
+    SIN_SPAN,
+    UT0,  # velocity of the sections relative to the air, see `sbs_sim.model.section`
+    UT1,
+    UP0,
+    UP1,
+    FORCE_N,
+    FORCE_T,
+    MOMENT_N,
+    MOMENT_T,
+    FLAP_MOMENT,  # about the hinges, without accelerations
+    LAG_MOMENT,
+    INVERSE_A2,
+    FLAP_ACCELERATION,
+    LAG_ACCELERATION,
+) = range(0, 28 * LANES, LANES)
+FLAP_COUPLING, LAG_COUPLING, BASE_LOAD = range(28 * LANES, 46 * LANES, 6 * LANES)  # of unit beta'', xi''; without them
+PAPER_MOMENT = 46 * LANES  # moment about the hub in the paper's reading without its inertial part, body axes
+FLAP_AXIS = 49 * LANES  # unit vector f, body axes
+BLADE_SIZE = 52 * LANES
 
 # inertia: columns of the mass, first moment and six second moments of one rotor's blades about the c.g.
 INERTIA_SIZE = 10
@@ -120,7 +157,7 @@ class Work(NamedTuple):
 
     Attributes
     ----------
-    blade : ndarray, shape (n_blades, BLADE_SIZE)
+    blade : ndarray, shape (n_blocks, BLADE_SIZE)
     rotor_inertia : ndarray, shape (n_rotors, INERTIA_SIZE)
     loads : ndarray, shape (n_rotors, LOAD_SIZE)
         Output: thrust [N], torque [N m], hub force [N] and moment [N m] of the last derivative.
@@ -137,8 +174,10 @@ class Work(NamedTuple):
         Azimuths of a stage [rad].
     wind : ndarray, shape (3,)
         Wind of a stage, NED [m/s].
-    strip : ndarray, shape (STRIP_ROWS * CHUNK,)
-        Section values along one blade, row by row.
+    strip : ndarray, shape (LANES, STRIP_ROWS * CHUNK)
+        Section values along each blade of a block, row by row.
+    cell : ndarray of int32, shape (LANES, CHUNK)
+        Rows of `Params.cells`.
     """
 
     blade: Array
@@ -152,6 +191,7 @@ class Work(NamedTuple):
     psi: Array
     wind: Array
     strip: Array
+    cell: NDArray[np.int32]
 
 
 def make_work(params: Params) -> Work:
@@ -160,7 +200,7 @@ def make_work(params: Params) -> Work:
     blades = int(params.first_blade[-1])
     size = 13 + 4 * blades + 3 * rotors
     return Work(
-        blade=np.zeros((blades, BLADE_SIZE)),
+        blade=_make_blades(params),
         rotor_inertia=np.zeros((rotors, INERTIA_SIZE)),
         loads=np.zeros((rotors, LOAD_SIZE)),
         aero=np.zeros((rotors, 3)),
@@ -170,5 +210,16 @@ def make_work(params: Params) -> Work:
         stages=np.zeros((4, size)),
         psi=np.zeros(rotors),
         wind=np.zeros(3),
-        strip=np.zeros(STRIP_ROWS * CHUNK),
+        strip=np.zeros((LANES, STRIP_ROWS * CHUNK)),
+        cell=np.zeros((LANES, CHUNK), dtype=np.int32),
     )
+
+
+def _make_blades(params: Params) -> Array:
+    """Work rows of all blocks, with what is constant in them."""
+    work = np.zeros((int(params.first_block[-1]), BLADE_SIZE))
+    for j in range(len(params.rotor)):
+        lanes = work[params.first_block[j] : params.first_block[j + 1], IS_BLADE : IS_BLADE + LANES].ravel()
+        lanes[: params.first_blade[j + 1] - params.first_blade[j]] = 1.0
+        work[params.first_block[j] : params.first_block[j + 1], IS_BLADE : IS_BLADE + LANES] = lanes.reshape(-1, LANES)
+    return work

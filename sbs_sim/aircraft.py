@@ -288,7 +288,7 @@ class Aircraft:
             named = str(error).startswith(f"{path} = ")
             raise AircraftError(f"{error}" if named else f"{path} = {_short(value)}: {error}") from None
 
-    @property
+    @cached_property
     def layout(self) -> StateLayout:
         """Places and names of the states of this aircraft."""
         return StateLayout(tuple(rotor.blades for rotor in self.rotors))

@@ -21,6 +21,7 @@ from sbs_sim.analysis.trim import TrimPoint, trim
 from sbs_sim.errors import LinearizationError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
+from sbs_sim.model.average import azimuths
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
 
 Array = NDArray[np.float64]
@@ -301,12 +302,6 @@ def used_states(point: TrimPoint) -> NDArray[np.int64]:
     return np.array(used)
 
 
-def azimuths(aircraft: Aircraft, count: int) -> Array:
-    """Azimuth configurations of eq. [15]: the first blade of each rotor [rad], shape (count, n_rotors)."""
-    blades = np.array([rotor.blades for rotor in aircraft.rotors])
-    return 2.0 * math.pi * np.arange(count)[:, None] / (blades * count)
-
-
 def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) -> Array:
     """Derivatives of all outputs of `sbs_sim.model.linear` by states and controls, at each azimuth.
 
@@ -340,14 +335,14 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
 def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> LinearModel:
     """Model by central differences of the averaged derivative."""
     steps = difference_steps(aircraft, step_scale)
-    each = jacobians(aircraft, point, azimuths(aircraft, point.azimuth_count), steps)
+    each = jacobians(aircraft, point, azimuths(aircraft.layout.blades, point.azimuth_count), steps)
     mean = each.mean(axis=0)
     used = used_states(point)
     size = len(point.state)
     inputs = np.concatenate([used, size + np.arange(len(S.CONTROL_NAMES))])
     outputs, names, units = _outputs(aircraft, point, mean)
-    steps = steps[inputs]
-    n = len(used)
+    weights = np.zeros((size, size))
+    weights[np.ix_(used, used)] = steps[used] / steps[used, None]
     return LinearModel(
         a=mean[np.ix_(used, used)],
         b=mean[used, size:],
@@ -359,23 +354,22 @@ def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> Linear
         control_units=("rad",) * len(S.CONTROL_NAMES),
         output_names=names,
         output_units=units,
-        steps=steps,
+        steps=steps[inputs],
         trim=point,
         method="averaged",
-        azimuth_spread=_relative_spread(each[:, used][:, :, used], steps[:n]),
-        spread=0.5 * np.ptp(each[:, used][:, :, inputs], axis=0),
+        azimuth_spread=_relative_spread(each[:, :size, :size] - mean[:size, :size], mean[:size, :size], weights),
+        spread=0.5 * np.ptp(each, axis=0)[np.ix_(used, inputs)],
         parameter_hash=aircraft.parameter_hash,
         kinematics=kinematics(point.state, aircraft.body.inertia, aircraft.environment.gravity),
     )
 
 
-def _relative_spread(each: Array, steps: Array) -> float:
-    """See `LinearModel.azimuth_spread`; every state is measured in its step."""
-    if len(each) == 1:
+def _relative_spread(departures: Array, mean: Array, weights: Array) -> float:
+    """See `LinearModel.azimuth_spread`; weights, shape (n, n), measure every state in its step."""
+    if len(departures) == 1:
         return math.nan
-    scaled = each * steps / steps[:, None]
-    mean = scaled.mean(axis=0)
-    return float(np.linalg.norm(scaled - mean, axis=(1, 2)).max() / np.linalg.norm(mean))
+    squares = np.einsum("kij,kij,ij->k", departures, departures, weights**2)
+    return float(math.sqrt(squares.max()) / np.linalg.norm(mean * weights))
 
 
 def _outputs(aircraft: Aircraft, point: TrimPoint, mean: Array) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:

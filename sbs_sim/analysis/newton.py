@@ -1,4 +1,7 @@
-"""Newton's method with central differences and halved steps, for a few dozen unknowns of order one or less."""
+"""Newton's method with central differences and halved steps, for a few dozen unknowns of order one or less.
+
+A Jacobian costs as much as some dozens of residuals, so it is kept as long as it serves.
+"""
 
 import math
 from collections.abc import Callable
@@ -13,6 +16,7 @@ Equations = Callable[[Array], Array]
 TOLERANCE = 1e-11  # of the largest residual, which is to be scaled to the order of one
 MOST_ITERATIONS = 30
 DIFFERENCE_STEP = 1e-6
+GOOD_ENOUGH = 0.1  # a step that leaves less of the residual is followed by another with the same Jacobian
 LARGEST_UNKNOWN = math.pi / 2  # angles and inflow ratios beyond it make no sense
 
 
@@ -46,20 +50,28 @@ def newton(equations: Equations, start: Array, jacobian: Equations | None = None
         Derivative of the residuals by the unknowns, shape (n, n), of these; by central differences if not given.
     """
     slope = jacobian or (lambda values: _jacobian(equations, values))
-    values, residual = start, equations(start)
+    values, residual, matrix = start, equations(start), None
     for iteration in range(MOST_ITERATIONS):
         size = float(np.abs(residual).max())
         if size < TOLERANCE:
             return Solution(values, residual, iteration, True)
+        fresh = matrix is None
+        if matrix is None:
+            matrix = slope(values)
         try:
-            step = np.asarray(np.linalg.solve(slope(values), residual), dtype=np.float64)
+            step = np.asarray(np.linalg.solve(matrix, residual), dtype=np.float64)
         except np.linalg.LinAlgError:
             break
-        better = _descend(equations, values, step, residual)
+        better = _descend(equations, values, step, residual, 8 if fresh else 1)
+        if better is None and not fresh:
+            matrix = None
+            continue
         if better is None:
             if size < 100 * TOLERANCE:  # rounding has stopped it, not the equations
                 return Solution(values, residual, iteration, True)
             break
+        if np.abs(better[1]).max() > GOOD_ENOUGH * size:
+            matrix = None
         values, residual = better
     return Solution(values, residual, iteration + 1, False)
 
@@ -75,11 +87,13 @@ def _jacobian(equations: Equations, values: Array) -> Array:
     return np.stack(columns, axis=1)
 
 
-def _descend(equations: Equations, values: Array, step: Array, residual: Array) -> tuple[Array, Array] | None:
+def _descend(
+    equations: Equations, values: Array, step: Array, residual: Array, halvings: int
+) -> tuple[Array, Array] | None:
     """Unknowns and residual after the longest of the steps 1, 1/2, 1/4 ... that lessens it; None if none does."""
     size = np.linalg.norm(residual)
-    for halvings in range(8):
-        candidate = values - step / 2**halvings
+    for halving in range(halvings):
+        candidate = values - step / 2**halving
         if np.abs(candidate).max() < LARGEST_UNKNOWN:
             new = equations(candidate)
             if np.linalg.norm(new) < size:  # false for a NaN as well

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft, Rotor
-from sbs_sim.analysis.linearize import azimuths, kinematics, used_states
+from sbs_sim.analysis.linearize import kinematics, used_states
 from sbs_sim.analysis.trim import TrimPoint
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
-from sbs_sim.model.average import averaged_derivative
+from sbs_sim.model.average import averaged_derivative, azimuths
 from sbs_sim.model.frames import rotation_matrix
 from sbs_sim.model.inflow import inflow_matrix
 from sbs_sim.model.multiblade import blade_matrix
@@ -94,7 +94,7 @@ class _TaylorTerms:
         self.inflow_start = S.LINEAR_BODY_SIZE + 4 * self.layout.blade_count
         self._params = aircraft.params(point.lead_lag, point.cyclic_inflow)
         self._work = P.make_work(self._params)
-        self._psi = azimuths(aircraft, point.azimuth_count)
+        self._psi = azimuths(aircraft.layout.blades, point.azimuth_count)
         self._dx = np.zeros(self.layout.size)
         self._loads = np.zeros((len(aircraft.rotors), P.LOAD_SIZE))
         self._constant = [self._turning(rotor) for rotor in aircraft.rotors]

@@ -16,7 +16,7 @@ from sbs_sim.analysis.export import trim_to_dict
 from sbs_sim.errors import TrimError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
-from sbs_sim.model.average import averaged_derivative
+from sbs_sim.model.average import averaged_derivative, azimuths
 from sbs_sim.model.frames import euler_to_quaternion, hub_axes, rotation_matrix
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
 
@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 ATTITUDE_UNKNOWNS, CONTROL_UNKNOWNS = 2, 4
 BODY_UNKNOWNS = ATTITUDE_UNKNOWNS + CONTROL_UNKNOWNS
 BODY_STEP, ROTOR_STEP = 1e-5, 1e-6  # of the differences: m/s, rad/s, rad; rad, inflow ratio
+JACOBIAN_AZIMUTHS = 4  # enough to say where to go, the residual says where to stop
 MOTION = [S.LINEAR_U, S.LINEAR_V, S.LINEAR_W, S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]
 
 
@@ -230,7 +231,7 @@ class TrimProblem:
         return self._dx[self.equations] / self.scales
 
     def jacobian(self, condition: TrimCondition, unknowns: Array) -> Array:
-        """Derivative of `residual` by the unknowns, shape (n, n).
+        """Derivative of `residual` by the unknowns, shape (n, n), averaged over a few azimuths.
 
         Central differences in one call of compiled code, so that trims in several threads hardly wait for each other.
         Pitch and roll act by the attitude, and by the axes in which the condition's motion is taken.
@@ -243,11 +244,10 @@ class TrimProblem:
         steps[: S.LINEAR_BODY_SIZE] = BODY_STEP
         steps[rotor] = steps[size:] = ROTOR_STEP
         steps[[S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]] *= condition.turn_rate != 0.0
-        blades = np.array(self.layout.blades)
-        psi = 2 * np.pi * np.arange(self.azimuth_count)[:, None] / (blades * self.azimuth_count)
+        psi = azimuths(self.layout.blades, min(self.azimuth_count, JACOBIAN_AZIMUTHS))
         outputs = size + SPECIFIC_FORCE_SIZE + self.loads.size
-        each = np.zeros((self.azimuth_count, len(inputs), outputs))
-        swash = np.zeros((len(blades), len(S.SWASHPLATE_NAMES)))
+        each = np.zeros((len(psi), len(inputs), outputs))
+        swash = np.zeros((psi.shape[1], len(S.SWASHPLATE_NAMES)))
         jacobian(self.params, inputs, self._mixing, steps, psi, np.zeros(3), self.work, swash, each)
         slopes = each.mean(axis=0).T[self._linear_equations]
         columns = [

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sbs_sim.analysis.newton import Equations, newton
 from sbs_sim.analysis.trim_problem import BODY_UNKNOWNS, TrimCondition, TrimProblem
 from sbs_sim.errors import TrimError
+from sbs_sim.model.average import azimuths
 from sbs_sim.model.dynamics import steady_balance
 
 Array = NDArray[np.float64]
@@ -72,9 +73,7 @@ class _TwoLoops:
         self._problem, self._condition = problem, condition
         self._body = np.arange(BODY_UNKNOWNS)
         self._coordinates, self._inflow = problem.coordinates, problem.inflow
-        blades = np.array([rotor.blades for rotor in problem.aircraft.rotors])
-        count = problem.azimuth_count
-        self._azimuths = 2 * np.pi * np.arange(count)[:, None] / (blades * count)  # paper eq. [15]
+        self._azimuths = azimuths(problem.layout.blades, problem.azimuth_count)
         self._inverse_inertia = np.linalg.inv(problem.aircraft.body.inertia)
         self._dx, self._imbalance = np.zeros(problem.layout.size), np.zeros(6)
 

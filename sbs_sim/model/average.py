@@ -1,9 +1,18 @@
 """Averages of the derivative over the azimuth (theory.md section 8; paper eq. [15])."""
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbs_sim.model.dynamics import evaluate
 from sbs_sim.model.kernel import entry
+
+
+def azimuths(blades: Sequence[int], count: int) -> NDArray[np.float64]:
+    """Azimuth configurations of eq. [15]: the first blade of each rotor [rad], shape (count, n_rotors)."""
+    return 2.0 * math.pi * np.arange(count)[:, None] / (np.array(blades) * count)
 
 
 @entry

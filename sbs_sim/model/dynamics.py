@@ -54,7 +54,16 @@ def evaluate(p, x, swash, psi, wind, work, dx):
     They must not call the entry: its machine code would be in theirs as well, and of equal names the loader takes the
     first that it meets, which may be optimised otherwise. The last bits would then hang on what was loaded first.
     """
-    rot, om, g = _known_terms(p, x, swash, psi, wind, work)
+    evaluate_rotors(p, x, swash, psi, wind, work, dx, 0, p.rotor.shape[0])
+
+
+@kernel
+def evaluate_rotors(p, x, swash, psi, wind, work, dx, first, last):
+    """What `derivative` does where since the last call only states of the rotors first to last - 1 have changed.
+
+    The blades of the other rotors do not feel that before the body's accelerations are known.
+    """
+    rot, om, g = _known_terms(p, x, swash, psi, wind, work, first, last)
     if p.switches[P.COMPLETE_COUPLING] == 1:
         _solve_with_blades(p, work)
         _solve_blades(p, work)
@@ -87,7 +96,7 @@ def steady_balance(p, x, swash, psi, wind, work, dx, imbalance):
     imbalance : ndarray, shape (6,)
         Output: force [N] and moment about the c.g. [N m], body axes, that are left to accelerate the aircraft.
     """
-    rot, om, g = _known_terms(p, x, swash, psi, wind, work)
+    rot, om, g = _known_terms(p, x, swash, psi, wind, work, 0, p.rotor.shape[0])
     body = work.vector
     for m in range(6):
         imbalance[m] = body[m]
@@ -107,8 +116,11 @@ def steady_balance(p, x, swash, psi, wind, work, dx, imbalance):
 
 
 @kernel
-def _known_terms(p, x, swash, psi, wind, work):
-    """Work rows of all blades and the known part of the body's system; rotation, body rates and gravity."""
+def _known_terms(p, x, swash, psi, wind, work, first, last):
+    """Work rows of the blades of rotors first to last - 1 and the known part of the body's system.
+
+    Returns rotation, body rates and gravity.
+    """
     rot = rotation_rows(x[3], x[4], x[5], x[6])
     om = (x[10], x[11], x[12])
     gravity = p.air[P.GRAVITY]
@@ -118,7 +130,7 @@ def _known_terms(p, x, swash, psi, wind, work):
         x[8] - (rot[1] * wind[0] + rot[4] * wind[1] + rot[7] * wind[2]),
         x[9] - (rot[2] * wind[0] + rot[5] * wind[1] + rot[8] * wind[2]),
     )
-    for j in range(p.rotor.shape[0]):
+    for j in range(first, last):
         _rotor_terms(p, j, x, swash, psi[j], air, om, g, work)
     _start_body_system(p, air, om, work)
     return rot, om, g

@@ -8,7 +8,7 @@ import math
 
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
-from sbs_sim.model.dynamics import evaluate
+from sbs_sim.model.dynamics import evaluate_rotors
 from sbs_sim.model.kernel import entry, kernel
 
 SPECIFIC_FORCE_SIZE = 3
@@ -37,23 +37,54 @@ def jacobian(p, point, mixing, steps, psi, still_air, work, swash, out):
     out : ndarray, shape (n_azimuths, n + 4, n + 3 + 8 n_rotors)
         Output: the transposed Jacobian at each azimuth; columns without a step stay as they are.
     """
-    for i in range(point.size):
-        if steps[i] == 0.0:
-            continue
-        middle = point[i]
-        for k in range(psi.shape[0]):
-            for m in range(out.shape[2]):
-                out[k, i, m] = 0.0
-        for side in range(2):
-            sign = 1.0 - 2.0 * side
-            point[i] = middle + sign * steps[i]
-            _set_up(p, point, mixing, work.stages[1], swash)
-            for k in range(psi.shape[0]):
-                for j in range(psi.shape[1]):
-                    work.psi[j] = psi[k, j]
-                evaluate(p, work.stages[1], swash, work.psi, still_air, work, work.stages[0])
-                _add_outputs(p, point, work, sign / (2.0 * steps[i]), out[k, i])
-        point[i] = middle
+    for k in range(psi.shape[0]):
+        for j in range(psi.shape[1]):
+            work.psi[j] = psi[k, j]
+        # the states of a rotor one after the other: what the blades of the others do is then worked out once
+        for rotor in range(-1, psi.shape[1]):
+            if rotor >= 0:
+                _evaluate(p, point, mixing, still_air, work, swash, -1)
+            for i in range(point.size):
+                if steps[i] != 0.0 and _rotor_of(p, i) == rotor:
+                    _difference(p, point, i, mixing, steps[i], still_air, work, swash, rotor, out[k, i])
+
+
+@kernel
+def _difference(p, point, i, mixing, step, still_air, work, swash, rotor, row):
+    """Central difference of the outputs by element i of the point, which belongs to a rotor, or to none (-1)."""
+    middle = point[i]
+    for m in range(row.size):
+        row[m] = 0.0
+    for side in range(2):
+        sign = 1.0 - 2.0 * side
+        point[i] = middle + sign * step
+        _evaluate(p, point, mixing, still_air, work, swash, rotor)
+        _add_outputs(p, point, work, sign / (2.0 * step), row)
+    point[i] = middle
+
+
+@kernel
+def _evaluate(p, point, mixing, still_air, work, swash, rotor):
+    """Derivative at a point of which only states of one rotor have changed, or any (-1)."""
+    _set_up(p, point, mixing, work.stages[1], swash)
+    first = max(rotor, 0)
+    last = p.rotor.shape[0] if rotor < 0 else rotor + 1
+    evaluate_rotors(p, work.stages[1], swash, work.psi, still_air, work, work.stages[0], first, last)
+
+
+@kernel
+def _rotor_of(p, i):
+    """Rotor that an element of the point is a state of, -1 for those of the body and controls."""
+    blades, rotors = p.first_blade[-1], p.rotor.shape[0]
+    place = i - S.LINEAR_BODY_SIZE
+    if place < 0 or place >= 4 * blades + 3 * rotors:
+        return -1
+    if place >= 4 * blades:
+        return (place - 4 * blades) // 3
+    for j in range(rotors):
+        if place % blades < p.first_blade[j + 1]:
+            return j
+    return -1
 
 
 @kernel

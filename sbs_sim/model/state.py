@@ -14,7 +14,7 @@ Flap and lag are multiblade coordinates (theory.md section 1), inflow is lambda0
 
 import re
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +80,7 @@ class Part:
     is_rate: bool = False
 
 
+@cache
 def part_of(name: str) -> Part:
     """Part that a linear state belongs to.
 

@@ -174,7 +174,7 @@ def test_a_flight_goes_on_from_its_own_state(sbs, hover):
         ("azimuth_step", 0.0, "azimuth_step = 0 deg: allowed are 0.01 to 45 deg"),
         ("azimuth_step", 60 * DEG, "azimuth_step = 60 deg: allowed are 0.01 to 45 deg"),
         ("azimuth_step", math.nan, "azimuth_step = nan deg: allowed are 0.01 to 45 deg"),
-        ("method", "euler", "method = 'euler': allowed are rk4, partitioned"),
+        ("method", "euler", "method = 'euler': allowed are rk4, tsit5, partitioned"),
     ],
 )
 def test_bad_options_are_refused(sbs, hover, option, value, line):

@@ -54,20 +54,22 @@ def evaluate(p, x, swash, psi, wind, work, dx):
     They must not call the entry: its machine code would be in theirs as well, and of equal names the loader takes the
     first that it meets, which may be optimised otherwise. The last bits would then hang on what was loaded first.
     """
-    evaluate_rotors(p, x, swash, psi, wind, work, dx, 0, p.rotor.shape[0])
+    evaluate_rotors(p, x, swash, psi, wind, work, dx, 0, p.rotor.shape[0], True)
 
 
 @kernel
-def evaluate_rotors(p, x, swash, psi, wind, work, dx, first, last):
+def evaluate_rotors(p, x, swash, psi, wind, work, dx, first, last, with_loads):
     """What `derivative` does where since the last call only states of the rotors first to last - 1 have changed.
 
-    The blades of the other rotors do not feel that before the body's accelerations are known.
+    The blades of the other rotors do not feel that before the body's accelerations are known. `work.loads` is set only
+    if it is asked for; the `complete` coupling does not need it.
     """
     rot, om, g = _known_terms(p, x, swash, psi, wind, work, first, last)
     if p.switches[P.COMPLETE_COUPLING] == 1:
         _solve_with_blades(p, work)
         _solve_blades(p, work)
-        _hub_loads(p, work)
+        if with_loads:
+            _hub_loads(p, work)
     else:
         _solve_blades_alone(p, work)
         _hub_loads(p, work)

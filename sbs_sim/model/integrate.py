@@ -1,16 +1,43 @@
-"""Fixed steps in time: classical Runge-Kutta, and the paper's partitioned scheme (theory.md section 7)."""
+"""Fixed steps in time: explicit Runge-Kutta methods, and the paper's partitioned scheme (theory.md section 7)."""
 
 import math
 
+import numpy as np
+
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
-from sbs_sim.model.dynamics import evaluate
+from sbs_sim.model.dynamics import evaluate_rotors
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_rotation_terms
 from sbs_sim.model.wind import wind_at
 
-RK4, PARTITIONED = 0, 1
-STAGE, SLOPE, SUM, FIRST = range(4)  # rows of Work.stages
+RK4, PARTITIONED, TSIT5 = range(3)
+STAGE, FIRST_SLOPE = 0, 1  # rows of Work.stages
+
+
+def _tableau(*rows):
+    """Butcher's tableau: coefficients of the stages, filled up with zeros, and the weights in the last row."""
+    table = np.zeros((P.MOST_STAGES + 1, P.MOST_STAGES))
+    for i, row in enumerate(rows[:-1]):
+        table[i, : len(row)] = row
+    table[-1, : len(rows[-1])] = rows[-1]
+    return table
+
+
+CLASSICAL = _tableau((), (1 / 2,), (0, 1 / 2), (0, 0, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
+# Ch. Tsitouras: Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying assumption, Computers and
+# Mathematics with Applications 62, 2011: the method of order 5.
+TSITOURAS = _tableau(
+    (),
+    (0.161,),
+    (-0.008480655492356989, 0.335480655492357),
+    (2.8971530571054935, -6.359448489975075, 4.3622954328695815),
+    (5.325864828439257, -11.748883564062828, 7.4955393428898365, -0.09249506636175525),
+    (5.86145544294642, -12.92096931784711, 8.159367898576159, -0.071584973281401, -0.028269050394068383),
+    (0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742, -3.290069515436081, 2.324710524099774),
+)
+TABLEAUS = np.stack([CLASSICAL, CLASSICAL, TSITOURAS])
+STAGES = np.array([4, 4, 6])
 
 
 @entry
@@ -32,7 +59,7 @@ def advance(p, x, swash, psi0, first_step, steps, h, wind, method, bounds, work)
     wind : ndarray, shape (WIND_SIZE,)
         Air of this tick.
     method : int
-        RK4 or PARTITIONED.
+        RK4, PARTITIONED or TSIT5.
     bounds : ndarray, shape (size,)
         Largest magnitude of each state that is still plausible.
     work : Work
@@ -58,29 +85,36 @@ def advance(p, x, swash, psi0, first_step, steps, h, wind, method, bounds, work)
 @kernel
 def _step(p, x, swash, psi0, number, h, wind, fraction, share, method, work):
     """One step from x; the new state is left in the stage row."""
-    stage, slope, total, first = work.stages[STAGE], work.stages[SLOPE], work.stages[SUM], work.stages[FIRST]
-    time = number * h
-    _copy(x, stage)
-    _copy(x, total)
-    for k in range(4):
-        ahead = 0.5 * ((k + 1) // 2)  # 0, 1/2, 1/2, 1
+    stage, tableau, count = work.stages[STAGE], TABLEAUS[method], STAGES[method]
+    time, rotors = number * h, p.rotor.shape[0]
+    for k in range(count):
+        ahead = _combine(x, work.stages, tableau[k], k, h)
         _azimuths(p, psi0, number, ahead, h, work.psi)
         wind_at(wind, time + ahead * h, fraction + ahead * share, work.wind)
-        evaluate(p, stage, swash, work.psi, work.wind, work, slope)
-        if method == PARTITIONED:
-            if k == 0:
-                _copy(slope, first)
-            else:
-                _freeze_forcing(p, x, stage, first, slope)
-        weight = h / 3.0 if k == 1 or k == 2 else h / 6.0
-        forward = h if k == 2 else 0.5 * h
-        for i in range(x.size):
-            total[i] += weight * slope[i]
-            stage[i] = x[i] + forward * slope[i]
-    _copy(total, stage)
+        slope = work.stages[FIRST_SLOPE + k]
+        evaluate_rotors(p, stage, swash, work.psi, work.wind, work, slope, 0, rotors, False)
+        if method == PARTITIONED and k > 0:
+            _freeze_forcing(p, x, stage, work.stages[FIRST_SLOPE], slope)
+    _combine(x, work.stages, tableau[-1], count, h)
     norm = 1.0 / math.sqrt(stage[3] ** 2 + stage[4] ** 2 + stage[5] ** 2 + stage[6] ** 2)
     for i in range(S.ATTITUDE, S.ATTITUDE + 4):
         stage[i] *= norm
+
+
+@kernel
+def _combine(x, stages, factors, count, h):
+    """Set the stage row to x plus h times a sum of the first slopes; the sum of its factors is returned."""
+    stage = stages[STAGE]
+    _copy(x, stage)
+    ahead = 0.0
+    for m in range(count):
+        factor = factors[m]
+        if factor != 0.0:
+            slope = stages[FIRST_SLOPE + m]
+            for i in range(x.size):
+                stage[i] += h * factor * slope[i]
+            ahead += factor
+    return ahead
 
 
 @kernel
@@ -94,7 +128,8 @@ def _copy(source, target):
 def _azimuths(p, psi0, number, ahead, h, psi):
     """Azimuths of all rotors a part of a step after step `number`, within 0 and 2 pi."""
     for j in range(psi0.size):
-        psi[j] = (psi0[j] + p.rotor[j, P.SPEED] * h * (number + ahead)) % (2.0 * math.pi)
+        angle = psi0[j] + p.rotor[j, P.SPEED] * h * (number + ahead)
+        psi[j] = angle - 2.0 * math.pi * np.floor(angle * (0.5 / math.pi))
 
 
 @kernel

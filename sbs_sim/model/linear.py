@@ -69,7 +69,7 @@ def _evaluate(p, point, mixing, still_air, work, swash, rotor):
     _set_up(p, point, mixing, work.stages[1], swash)
     first = max(rotor, 0)
     last = p.rotor.shape[0] if rotor < 0 else rotor + 1
-    evaluate_rotors(p, work.stages[1], swash, work.psi, still_air, work, work.stages[0], first, last)
+    evaluate_rotors(p, work.stages[1], swash, work.psi, still_air, work, work.stages[0], first, last, True)
 
 
 @kernel

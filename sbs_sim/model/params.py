@@ -67,6 +67,9 @@ KNOT_GROUP = 8
 SPAN, CHORD, HALF_AREA, LIFT_FRACTION, TWIST = range(0, 5 * CHUNK, CHUNK)
 ELEMENT_SIZE = 5 * CHUNK
 
+# of a Runge-Kutta method
+MOST_STAGES = 6
+
 # loads: columns of one rotor's outputs; forces and moments in body axes about the hub centre
 THRUST, TORQUE, FORCE, MOMENT = 0, 1, 2, 5
 LOAD_SIZE = 8
@@ -168,8 +171,8 @@ class Work(NamedTuple):
     matrix : ndarray, shape (6, 6)
     vector : ndarray, shape (6,)
         Linear system of the body; after the solution: specific force of the c.g. [m/s^2], om' [rad/s^2].
-    stages : ndarray, shape (4, state size)
-        Stage state, its derivative, the running sum and the derivative at the start of a step.
+    stages : ndarray, shape (1 + MOST_STAGES, state size)
+        State at a stage of a step, and the derivatives at its stages.
     psi : ndarray, shape (n_rotors,)
         Azimuths of a stage [rad].
     wind : ndarray, shape (3,)
@@ -207,7 +210,7 @@ def make_work(params: Params) -> Work:
         hub_flow=np.zeros((rotors, 3)),
         matrix=np.zeros((6, 6)),
         vector=np.zeros(6),
-        stages=np.zeros((4, size)),
+        stages=np.zeros((1 + MOST_STAGES, size)),
         psi=np.zeros(rotors),
         wind=np.zeros(3),
         strip=np.zeros((LANES, STRIP_ROWS * CHUNK)),

@@ -50,8 +50,11 @@ def arctangent2(y, x):
     below = low + high if beyond else high + TINY
     z = above / below
     q = z * z
-    angle = A4 + q * (A5 + q * (A6 + q * (A7 + q * A8)))
-    angle = z * (A0 + q * (A1 + q * (A2 + q * (A3 + q * angle))))
+    q2 = q * q
+    q4 = q2 * q2
+    # Estrin's order: fewer operations wait for each other than in Horner's
+    angle = (A4 + q * A5) + q2 * (A6 + q * A7) + q4 * A8
+    angle = z * ((A0 + q * A1) + q2 * (A2 + q * A3) + q4 * angle)
     angle = angle + 0.25 * math.pi if beyond else angle
     angle = 0.5 * math.pi - angle if b > a else angle
     angle = math.pi - angle if x < 0.0 else angle

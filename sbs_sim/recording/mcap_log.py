@@ -17,16 +17,14 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from sbs_sim.errors import RecordingError
-from sbs_sim.recording.mcap_file import CHECKSUM, MAGIC, ROSBAG2, FileBuilder, Message, NewFile
+from sbs_sim.recording.mcap_file import CHECKSUM, MAGIC, RECOVERY, ROSBAG2, START, FileBuilder, Message, NewFile
 
 FLUSH_PERIOD = 0.2  # s of wall time between chunks
 CHUNK_SIZE = 256 * 1024  # bytes of messages at which a chunk is closed before that
 QUEUE_LENGTH = 10_000  # messages that wait for the disk: 15 s of flight
 LARGEST_ATTACHMENT = 1 << 27  # bytes
 LATEST_TIME = 2**63  # ns; MCAP could hold twice that, most readers cannot
-START = "recording"  # metadata records of our own
-END = "recording_end"
-RECOVERY = "recovery"
+END = "recording_end"  # metadata records of our own
 RESERVED = (START, END, RECOVERY, ROSBAG2)
 
 

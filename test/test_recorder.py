@@ -42,6 +42,7 @@ from sbs_msgs.msg import (  # noqa: E402
 from sbs_msgs.srv import Reset, SetWind, Step, Trim  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
+from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
 
 DEGREE = math.radians(1.0)
 STATE_TOPICS = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "odom": Odometry, "/clock": Clock}
@@ -349,8 +350,8 @@ def recorded(tmp_path_factory, hover):
     return fly(tmp_path_factory.mktemp("recorded"), lambda made: wiggle(made, hover, 1.5))
 
 
-def play(tmp_path, path, *arguments, act=lambda made: None):
-    """Messages that a subscriber gets of a replay, and how long it took."""
+def play(tmp_path, path, *arguments, act=lambda made: None, code=0):
+    """Messages that a subscriber gets of a replay, and what it printed."""
     with world(next(DOMAINS), tmp_path) as made:
         received = {topic: made.client.watch(topic, kind) for topic, kind in STATE_TOPICS.items()}
         received["events"] = made.client.watch("events", FlightEvent)
@@ -365,14 +366,14 @@ def play(tmp_path, path, *arguments, act=lambda made: None):
             made.client.spin(0.3)
         finally:
             process.kill()
-            process.wait(PATIENCE)
-        assert process.returncode == 0, process.stderr.read()
-    return received
+            _, output = process.communicate(timeout=PATIENCE)
+        assert process.returncode == code, output
+    return received, output
 
 
 def test_replay_publishes_what_was_recorded(tmp_path, recorded):
     heard = ("--delay", 30, "--topics", *STATE_TOPICS)
-    received, log = play(tmp_path, recorded, *heard), read(recorded)
+    (received, _), log = play(tmp_path, recorded, *heard), read(recorded)
     stamps = [message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in received["state"]]
     assert stamps == log["state"].time_ns.tolist()
     assert received["/clock"]
@@ -380,7 +381,7 @@ def test_replay_publishes_what_was_recorded(tmp_path, recorded):
 
 
 def test_replay_of_a_part_and_of_some_topics(tmp_path, recorded):
-    received = play(tmp_path, recorded, "--start", 0.5, "--end", 1.0, "--delay", 30, "--topics", "state", "/odom")
+    received, _ = play(tmp_path, recorded, "--start", 0.5, "--end", 1.0, "--delay", 30, "--topics", "state", "/odom")
     stamps = [message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec for message in received["state"]]
     assert min(stamps) >= 0.5
     assert max(stamps) <= 1.0 + 1e-6
@@ -398,7 +399,7 @@ def test_replay_can_be_paused(tmp_path, recorded):
         assert len(made.client.messages["state"]) == count
         assert made.client.call(SetBool, "pause", data=False).success
 
-    received = play(tmp_path, recorded, "--rate", 0.5, act=act)
+    received, _ = play(tmp_path, recorded, "--rate", 0.5, act=act)
     assert received["state"][-1].position.z == read(recorded)["state"]["position.z"][-1]
 
 
@@ -445,15 +446,89 @@ def test_unknown_topics_are_named(recorded):
     assert "/state" in found.stderr
 
 
-def test_a_damaged_log_is_told_in_one_line(tmp_path, recorded):
+def test_a_damaged_log_is_played_up_to_the_damage(tmp_path, recorded):
+    """Nothing wrong is published; one line and the exit code tell of it."""
     damaged = tmp_path / "damaged.mcap"
     data = bytearray(Path(recorded).read_bytes())
-    for place in range(len(data) // 2, len(data) * 9 // 10):  # so much that whole chunks are hit, not an index alone
-        data[place] ^= 0xFF
+    with Source(recorded) as source:
+        chunks = sorted(read_summary(source).chunks)
+    data[chunks[len(chunks) * 2 // 3] + 200] ^= 1
     damaged.write_bytes(data)
-    found = replay(damaged, domain=next(DOMAINS))
-    assert "Traceback" not in found.stderr
-    assert "--recover" in found.stderr
+    received, output = play(tmp_path, damaged, "--rate", 5, "--delay", 30, "--topics", *STATE_TOPICS, code=1)
+    heights, expected = [message.position.z for message in received["state"]], read(recorded)["state"]["position.z"]
+    assert 10 < len(heights) < len(expected)
+    assert heights == expected[: len(heights)].tolist()
+    assert len(output.splitlines()) == 1
+    assert f"replay --recover {damaged}" in output
+
+
+def test_a_log_of_another_writer_is_played(tmp_path):
+    """Without checksums, and with topics that cannot be published: those are left out, and named."""
+    from mcap.writer import Writer
+    from rclpy.serialization import serialize_message
+
+    from sbs_sim.nodes.recorder import definition_file
+    from sbs_sim.recording import message_definition
+
+    def publish(writer, topic, type_name, encoding, definition, data):
+        schema = writer.register_schema(type_name, "ros2msg", definition.encode()) if type_name else 0
+        channel = writer.register_channel(topic, encoding, schema)
+        for i in range(20):
+            writer.add_message(channel, 1_700_000_000_000_000_000 + i * 20_000_000, data(i), 0)
+
+    path = tmp_path / "other.mcap"
+    left_out = {
+        "/json": ("", "json", "", "no ROS 2 messages"),
+        "/one": ("std_msgs/String", "ros1", "string data", "no ROS 2 messages"),
+        "/strange": ("strange_msgs/msg/Thing", "cdr", "int32 thing", "is not installed"),
+        "/nameless": ("/", "cdr", "int32 thing", "is not installed"),
+        "/bad name": ("std_msgs/msg/Bool", "cdr", "bool data", "ROS does not allow this name"),
+        "/flag": ("std_msgs/msg/Bool", "cdr", "float64 data", "installed with other fields"),
+    }
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=500, enable_crcs=False)
+        writer.start("ros2", "somebody")
+        definition = message_definition("sbs_msgs/msg/BodyState", definition_file)
+        body = BodyState()
+
+        def state(i):
+            body.position.z = float(i)
+            return serialize_message(body)
+
+        publish(writer, "state", "sbs_msgs/msg/BodyState", "cdr", definition, state)
+        for topic, (type_name, encoding, text, _) in left_out.items():
+            publish(writer, topic, type_name, encoding, text, lambda i: b"\0\1\0\0\1")
+        writer.finish()
+    received, output = play(tmp_path, path, "--delay", 30)
+    assert [message.position.z for message in received["state"]] == [float(i) for i in range(20)]
+    assert "other.mcap has no checksums" in output
+    for topic, (*_, why) in left_out.items():
+        assert any(f"{topic}: left out" in line and why in line for line in output.splitlines()), output
+    assert "Traceback" not in output
+
+
+def test_a_loop_over_an_instant_is_no_flood(tmp_path, recorded):
+    with world(next(DOMAINS), tmp_path) as made:
+        states = made.client.watch("state", BodyState)
+        part = ["--start", "1", "--end", "1.005", "--loop", "--topics", "state"]
+        command = [sys.executable, str(EXECUTABLES / "replay"), str(recorded), *part]
+        process = subprocess.Popen(command, env=environment(made.domain))
+        try:
+            made.client.until(lambda: states, "a state")
+            begin, before = time.monotonic(), len(states)
+            made.client.until(lambda: len(states) >= before + 20, "20 passes")
+            assert time.monotonic() - begin > 0.5  # 1 s, and no less if the machine is slow
+        finally:
+            process.kill()
+            process.wait(PATIENCE)
+
+
+def test_nothing_to_play_is_an_error(recorded):
+    for arguments in (["--start", "1000"], ["--start", "1000", "--loop"], ["--topics", "trim_point", "--"]):
+        found = replay(*arguments, recorded, domain=next(DOMAINS))
+        assert found.returncode == 1
+        assert "there is nothing to play" in found.stderr
+        assert len(found.stderr.splitlines()) == 1
 
 
 def test_the_log_that_comes_along_is_flown_again():

@@ -30,6 +30,7 @@ from sbs_sim.recording.cdr import Layout, decode, decode_one_by_one
 from sbs_sim.recording.definitions import SEQUENCE, Units, fields_of, parse, short_name
 from sbs_sim.recording.mcap_file import NewFile
 from sbs_sim.recording.mcap_log import CHUNK_SIZE
+from sbs_sim.recording.playback import Playback
 from sbs_sim.recording.scan import LARGEST, Source, read_summary, scan
 from sbs_sim.simulation import Simulation, trimmed_state
 
@@ -717,6 +718,77 @@ def test_what_cannot_be_opened_is_refused_in_one_line(tmp_path):
         read(tmp_path / "nothing.mcap")
     with pytest.raises(RecordingError, match=r"cannot read .*: Is a directory$"):
         read(tmp_path)
+
+
+# -- reading to play ---------------------------------------------------------------------------------
+
+
+def played(path, *part):
+    with Playback(path) as playback:
+        return [(log_time, data) for log_time, _, data in playback.messages(*part)]
+
+
+@pytest.mark.parametrize("case", OTHER_WRITERS)
+def test_what_is_played_is_what_is_read(tmp_path, case):
+    options, unchecked = OTHER_WRITERS[case]
+    path = foreign_log(tmp_path / "other.mcap", **options)
+    assert played(path) == [(number, number_message(number)) for number in range(200)]
+    with Playback(path) as playback:
+        assert bool(playback.warning) == ("messages" in unchecked)
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+def test_messages_are_played_in_the_order_of_their_time(tmp_path, chunked):
+    """Of several chunks that overlap, and messages of equal time as they were written."""
+    path = tmp_path / "other.mcap"
+    times = [number + random.Random(number).randrange(-150, 150) * (number % 3) for number in range(1000, 2000)]
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=1000, use_chunking=chunked)
+        writer.start(profile="ros2", library="other")
+        schema = writer.register_schema("test_msgs/msg/Number", "ros2msg", NUMBER.encode())
+        channel = writer.register_channel("/number", "cdr", schema)
+        for number, log_time in enumerate(times):
+            writer.add_message(channel, log_time * 10**6, number_message(number), 0)
+        writer.finish()
+    expected = sorted((log_time * 10**6, number) for number, log_time in enumerate(times))
+    assert played(path) == [(log_time, number_message(number)) for log_time, number in expected]
+    begin = expected[0][0]
+    part = [item for item in expected if 300 * 10**6 <= item[0] - begin <= 500 * 10**6]
+    assert played(path, 0.3, 0.5) == [(log_time, number_message(number)) for log_time, number in part]
+
+
+def test_playing_begins_at_once_and_ends_before_a_damage(original, tmp_path):
+    """What is played later is not read before; a damage before the part that is played does no harm."""
+    path = tmp_path / "whole.mcap"
+    path.write_bytes(original.data)
+    whole = played(path)
+    assert {data for _, data in whole} == set(original.messages.values())
+    (start, end), keys = sorted(original.chunks.items())[3]
+    data = bytearray(original.data)
+    data[end - 5] ^= 1
+    path = tmp_path / "damaged.mcap"
+    path.write_bytes(data)
+    found = []
+
+    def play():
+        with Playback(path) as playback:
+            found.extend((log_time, content) for log_time, _, content in playback.messages())
+
+    with pytest.raises(RecordingError, match=rf"is damaged \(byte {start}: .*--recover"):
+        play()
+    assert found == whole[: len(found)]
+    assert len(found) >= sum(len(item) for place, item in original.chunks.items() if place < (start, end)) - 6
+    last = max(log_time for log_time, content in whole if content in {original.messages[key] for key in keys})
+    later = played(path, (last - whole[0][0]) / 1e9 + 0.005)
+    assert later
+    assert later == whole[-len(later) :]
+
+
+def test_what_is_not_whole_is_not_played(original, tmp_path):
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(original.data[:-30_000])
+    with pytest.raises(RecordingError, match=r"cut.mcap is not whole \(.*: `replay --recover"):
+        Playback(path)
 
 
 # -- writing -----------------------------------------------------------------------------------------

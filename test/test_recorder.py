@@ -1,5 +1,6 @@
 """Flights and their logs: real processes, real DDS, real files."""
 
+import datetime
 import itertools
 import math
 import os
@@ -427,6 +428,8 @@ def test_replay_again_and_again_until_it_is_ended(tmp_path, recorded):
         (["nothing.mcap"], 1, "nothing.mcap"),
         (["--rate", "0", "x.mcap"], 2, "--rate 0.0: allowed are 0.001 to 1000"),
         (["--start", "3", "--end", "1", "x.mcap"], 2, "--start 3.0"),
+        (["--end", "nan", "x.mcap"], 2, "--end nan"),
+        (["x.mcap", "--output", "y.mcap"], 2, "--output: allowed with --recover and --with"),
         (["--verify", "nothing.mcap"], 1, "nothing.mcap"),
         (["--recover", "nothing.mcap"], 1, "nothing.mcap"),
         (["--verify", "--recover", "x.mcap"], 2, "not allowed with"),
@@ -437,6 +440,79 @@ def test_bad_arguments_are_named(arguments, code, text):
     assert found.returncode == code
     assert text in found.stderr
     assert "Traceback" not in found.stderr
+
+
+@pytest.mark.parametrize("seconds", [0.5, 2.0])
+def test_an_interrupted_command_leaves_nothing_and_says_nothing(tmp_path, recorded, seconds):
+    """Whatever it is at; the machine decides what that is."""
+    for number, mode in enumerate((["--with", "body.mass=23"], ["--recover"], ["--verify"])):
+        output = tmp_path / f"{number}.mcap"
+        extra = [] if mode == ["--verify"] else ["--output", str(output)]
+        command = [sys.executable, str(EXECUTABLES / "replay"), str(recorded), *mode, *extra]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        time.sleep(seconds)
+        process.send_signal(signal.SIGINT)
+        printed, _ = process.communicate(timeout=PATIENCE)
+        if process.returncode == 130:
+            assert printed == ""
+            assert not output.exists()
+        else:  # it had ended, or Python itself had only begun
+            assert process.returncode in (0, -signal.SIGINT)
+
+
+def test_a_flight_that_did_not_fit_on_the_disk_is_an_error(tmp_path, recorded):
+    command = [sys.executable, str(EXECUTABLES / "replay"), "--with", "body.mass=23", str(recorded)]
+    limit = Path(recorded).stat().st_size * 2 // 3
+
+    def limited():
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    output = tmp_path / "heavy.mcap"
+    command += ["--output", str(output)]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False, preexec_fn=limited)
+    assert found.returncode == 1
+    assert found.stderr == f"cannot write {output}: File too large\n"
+    assert found.stdout == ""
+
+
+def test_what_a_cut_log_is_compared_with_is_said(tmp_path, recorded):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(Path(recorded).read_bytes()[: Path(recorded).stat().st_size * 3 // 4])
+    found = replay("--verify", cut)
+    assert found.returncode == 0
+    assert "identical" in found.stdout
+    assert found.stderr.startswith(f"{cut} is not whole: ")
+    assert len(found.stderr.splitlines()) == 1
+
+
+def test_a_log_without_states_is_no_flight(tmp_path):
+    """As a simulator leaves it that is ended at once."""
+    from sbs_sim.nodes.recorder import Recorder
+    from sbs_sim.simulation import Simulation, trimmed_state
+
+    aircraft = Aircraft.load("sbs")
+    point = trim(aircraft)
+    Recorder(
+        str(tmp_path / "a.mcap"), Simulation(aircraft, trimmed_state(aircraft, point), point.swashplate), {}
+    ).close()
+    found = replay("--verify", tmp_path / "a.mcap")
+    assert found.returncode == 1
+    assert found.stderr.startswith("the log holds no flight of sbs_sim")
+    assert len(found.stderr.splitlines()) == 1
+
+
+def test_two_logs_of_a_second_have_two_names(tmp_path):
+    from sbs_sim.nodes.recorder import log_path
+
+    begin = datetime.datetime(2024, 5, 6, 7, 8, 9)
+    names = []
+    for _ in range(3):
+        path = log_path(str(tmp_path), "sbs", begin)
+        path.write_bytes(b"")
+        names.append(path.name)
+    assert names == [f"2024-05-06_07-08-09_sbs{end}.mcap" for end in ("", "_2", "_3")]
 
 
 def test_unknown_topics_are_named(recorded):

@@ -4,6 +4,7 @@ Not a node: messages come serialised from the publishers (`sbs_sim.nodes.host.To
 """
 
 import datetime
+import itertools
 import os
 from pathlib import Path
 from typing import Any
@@ -40,13 +41,14 @@ class Recorder:
         begin = datetime.datetime.now(datetime.timezone.utc).astimezone()
         self.path = log_path(record, simulation.aircraft.name, begin)
         self._channels: dict[str, int] = {}
+        own_versions = versions()
         self._writer = LogWriter(
             self.path,
-            library=f"sbs_sim {versions()['sbs_sim']}",
+            library=f"sbs_sim {own_versions['sbs_sim']}",
             wall_start=round(begin.timestamp() * 1e9),
             metadata={
                 "simulation": simulation_metadata(simulation),
-                "versions": versions(),
+                "versions": own_versions,
                 "parameters": {name: repr(value) for name, value in parameters.items()},
             },
             attachments=attachments(simulation.aircraft),
@@ -80,6 +82,11 @@ class Recorder:
         """Write the rest and end the file."""
         self._writer.close(CLOSING_TIME)
 
+    def discard(self) -> None:
+        """End the file and delete it."""
+        self.close()
+        self.path.unlink(missing_ok=True)
+
 
 def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
     """File of a log: the one that was named, or one named after time and aircraft in a folder.
@@ -96,7 +103,9 @@ def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(f"{folder}: {error.strerror}") from None
-    return folder / f"{begin:%Y-%m-%d_%H-%M-%S}_{aircraft}.mcap"
+    name = f"{begin:%Y-%m-%d_%H-%M-%S}_{aircraft}"
+    others = (folder / f"{name}_{number}.mcap" for number in itertools.count(2))  # of the same second
+    return next(path for path in itertools.chain([folder / f"{name}.mcap"], others) if not path.exists())
 
 
 def definition_file(package: str, place: str) -> Path:

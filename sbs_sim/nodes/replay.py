@@ -7,6 +7,7 @@ reads logs of other writers too, as long as their message types are installed.
 import argparse
 import importlib
 import itertools
+import signal
 import sys
 import threading
 import time
@@ -29,9 +30,10 @@ from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
+from sbs_sim.nodes.executables import INTERRUPTED
 from sbs_sim.nodes.host import EVENT_QOS, STATE_QOS, Component, run
 from sbs_sim.nodes.recorder import Recorder, definition_file
-from sbs_sim.recording import message_definition, read, recover
+from sbs_sim.recording import Log, message_definition, read, recover
 from sbs_sim.recording.definitions import parse
 from sbs_sim.recording.flight import TOLERANCE, Flight, flight_of, verify
 from sbs_sim.recording.playback import Playback
@@ -255,7 +257,7 @@ def _one_of(policy: Any, value: Any, first: tuple[str, int]) -> Any:
 # --- other aircraft, same commands ------------------------------------------------------------------------------
 
 
-def fly_with(flight: Flight, changes: Sequence[str], output: Path) -> tuple[Path, int]:
+def fly_with(flight: Flight, changes: Sequence[str], output: Path, stop: threading.Event) -> tuple[Path, int]:
     """Fly the events of a flight with a changed aircraft into a new log.
 
     Parameters
@@ -264,6 +266,8 @@ def fly_with(flight: Flight, changes: Sequence[str], output: Path) -> tuple[Path
     changes : sequence of str
         "PATH=VALUE" each, see `Aircraft.with_value`.
     output : Path
+    stop : threading.Event
+        Ends the flight with a KeyboardInterrupt.
 
     Returns
     -------
@@ -285,9 +289,14 @@ def fly_with(flight: Flight, changes: Sequence[str], output: Path) -> tuple[Path
     simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **flight.options)
     log = Recorder(str(output), simulation, {"with": list(changes)})
     try:
-        return log.path, _write_flight(flight, aircraft, simulation.step_size, log)
-    finally:
-        log.close()
+        steps = _write_flight(flight, aircraft, simulation.step_size, log, stop)
+    except BaseException:  # an interruption too: half a flight looks like a whole one
+        log.discard()
+        raise
+    log.close()
+    if log.fault:
+        raise RecordingError(log.fault)
+    return log.path, steps
 
 
 def changed(aircraft: Aircraft, change: str) -> Aircraft:
@@ -308,7 +317,7 @@ def changed(aircraft: Aircraft, change: str) -> Aircraft:
     return aircraft.with_value(path, value)
 
 
-def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Recorder) -> int:
+def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Recorder, stop: threading.Event) -> int:
     """Fly and record; the number of the last step."""
     made = StateMessages(aircraft)
     kinds = {
@@ -329,6 +338,8 @@ def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Rec
     last = 0
     try:
         for snapshot in refly(aircraft, flight.events, int(flight.steps[-1]), **flight.options):
+            if stop.is_set():
+                raise KeyboardInterrupt
             made.fill(snapshot)
             keep("/clock", Clock(clock=to_time(snapshot.time)), snapshot.time)
             for topic, message in (("/state", made.state), ("/rotors", made.rotors), ("/inflow", made.inflow)):
@@ -346,6 +357,8 @@ def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Rec
 def main(args: list[str] | None = None) -> None:
     """Do with a log what the command line asks for."""
     options = _parse(rclpy.utilities.remove_ros_args(args)[1:])
+    if options.recover:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # what is half written is to be taken away
     try:
         if options.recover:
             sys.exit(_recover(options.file, options.output))
@@ -354,6 +367,8 @@ def main(args: list[str] | None = None) -> None:
         if options.changes:
             sys.exit(_fly_with(options))
         sys.exit(_replay(options))
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
     except SbsError as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         sys.exit(1)
@@ -366,7 +381,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--start", type=float, default=0.0, help="where to begin [s after the first message]")
     parser.add_argument("--end", type=float, default=float("inf"), help="where to end [s after the first message]")
     parser.add_argument("--loop", action="store_true", help="begin again at the end")
-    parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, all if not given")
+    parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, all if not given; after FILE")
     parser.add_argument(
         "--delay", type=float, default=1.0, help="longest wait before the first message until every topic is heard [s]"
     )
@@ -377,13 +392,19 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
         "--with", dest="changes", action="append", metavar="KEY=VALUE", help="fly the commands with a changed aircraft"
     )
     parser.add_argument(
-        "--output", default="", help="log to write, a file or a folder (default of --recover: FILE.recovered.mcap)"
+        "--output",
+        default="",
+        help="log to write, a file or a folder (default: FILE.recovered.mcap, or one named after the time)",
     )
     options = parser.parse_args(arguments)
     if not 1.0 / LARGEST_RATE <= options.rate <= LARGEST_RATE:
         parser.error(f"--rate {options.rate}: allowed are {1 / LARGEST_RATE:g} to {LARGEST_RATE:g}")
     if not 0.0 <= options.delay <= LONGEST_DELAY:
         parser.error(f"--delay {options.delay}: allowed are 0 to {LONGEST_DELAY:g}")
+    if not 0.0 <= options.end <= float("inf"):
+        parser.error(f"--end {options.end}: allowed is 0 or more")
+    if options.output and not (options.recover or options.changes):
+        parser.error("--output: allowed with --recover and --with")
     if not 0.0 <= options.start <= options.end:
         parser.error(f"--start {options.start}: allowed are 0 to --end")
     return options
@@ -421,9 +442,17 @@ def _recover(path: Path, output: str) -> int:
     return 3
 
 
+def _read(path: Path) -> Log:
+    """A log; that something is missing in it is told."""
+    log = read(path)
+    if not log.complete:
+        print(f"{path} is not whole: {log.reasons[0]}", file=sys.stderr)
+    return log
+
+
 def _verify(path: Path) -> int:
     """0 if every state came again as it should."""
-    flight = flight_of(read(path))
+    flight = flight_of(_read(path))
     found = verify(flight)
     for name, (recorded, here) in found.other_versions.items():
         print(f"other {name}: {recorded or 'unknown'} recorded, {here} here")
@@ -445,8 +474,10 @@ def _verify(path: Path) -> int:
 
 
 def _fly_with(options: argparse.Namespace) -> int:
-    flight = flight_of(read(options.file))
-    path, steps = fly_with(flight, options.changes, Path(options.output) if options.output else Path())
+    flight = flight_of(_read(options.file))
+    stop = threading.Event()  # an exception would be lost in the callbacks of the compiler
+    signal.signal(signal.SIGINT, lambda *_: stop.set())
+    path, steps = fly_with(flight, options.changes, Path(options.output), stop)
     print(f"{path}: {steps} of {flight.steps[-1]} steps")
     return 0
 

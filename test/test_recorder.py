@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -198,6 +197,32 @@ def test_a_full_disk_does_not_stop_the_flight(tmp_path, hover):
     assert len(read(tmp_path / "a.mcap")["state"].time_ns) > 10
 
 
+def test_a_disk_that_is_full_at_the_very_end_is_told(tmp_path):
+    with world(next(DOMAINS), tmp_path) as made:
+        made.client.watch("status", SimulationStatus)
+        simulator = made.start("simulator", record=tmp_path / "a.mcap", components="[simulator, recorder]")
+        made.client.next("status", lambda message: message.sim_time > 0.5)
+        import resource
+
+        size = (tmp_path / "a.mcap").stat().st_size + 500
+        resource.prlimit(simulator.pid, resource.RLIMIT_FSIZE, (size, size))
+        assert simulator.interrupt() == 0
+    assert f"the log ends before the flight: cannot write {tmp_path / 'a.mcap'}: File too large" in simulator.output
+
+
+def test_an_interruption_in_a_long_computation_leaves_a_whole_log(tmp_path):
+    with world(next(DOMAINS), tmp_path) as made:
+        made.client.watch("status", SimulationStatus)
+        simulator = made.start("simulator", record=tmp_path / "a.mcap")
+        made.client.next("status")
+        service = made.client.node.create_client(Trim, "trim")
+        made.client.until(service.service_is_ready, "trim")
+        service.call_async(Trim.Request(airspeed=95.0, azimuth_count=1000))  # half a minute of arithmetic
+        made.client.spin(0.5)
+        assert simulator.interrupt() == 0
+    assert read(tmp_path / "a.mcap").complete
+
+
 def test_what_was_recorded_before_a_kill_can_be_read_after_it(tmp_path, hover):
     with world(next(DOMAINS), tmp_path) as made:
         states = made.client.watch("state", BodyState)
@@ -274,19 +299,19 @@ def test_a_flight_as_fast_as_it_goes_comes_again_and_nothing_is_left_out(tmp_pat
 
 
 def test_a_flight_under_load_comes_again_bit_for_bit(tmp_path, hover):
-    stop = threading.Event()
-    burners = [
-        subprocess.Popen([sys.executable, "-c", "while True: pass"], stdout=subprocess.DEVNULL)
-        for _ in range(2 * (os.cpu_count() or 1))
-    ]
-    try:
-        path = fly(tmp_path, lambda made: wiggle(made, hover, 1.0))
-    finally:
-        stop.set()
-        for burner in burners:
-            burner.kill()
-            burner.wait()
-    assert_identical(path)
+    def act(made):
+        burners = [
+            subprocess.Popen([sys.executable, "-c", "while True: pass"], stdout=subprocess.DEVNULL)
+            for _ in range(2 * (os.cpu_count() or 1))
+        ]
+        try:
+            wiggle(made, hover, 1.0)
+        finally:
+            for burner in burners:
+                burner.kill()
+                burner.wait()
+
+    assert_identical(fly(tmp_path, act))
 
 
 def test_commands_past_the_mixer_come_again(tmp_path, hover):

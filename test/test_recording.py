@@ -859,6 +859,22 @@ def test_a_slow_disk_never_blocks_and_what_is_dropped_is_counted(tmp_path, monke
     assert found.metadata["recording_end"] == {"written": "101", "dropped": "200"}
 
 
+def test_there_is_room_for_what_is_essential(tmp_path, monkeypatch):
+    """It is neither waited for nor dropped when the rest is."""
+    disk = SlowDisk(monkeypatch)
+    log = new_log(tmp_path / "log.mcap", queue_length=10)
+    channel = add_number(log)
+    log.write(channel, 0, number_message(0))
+    assert disk.waiting.wait(10)
+    taken = [log.write(channel, number, number_message(number)) for number in range(1, 13)]
+    taken += [log.write(channel, number, number_message(number), essential=True) for number in range(13, 25)]
+    assert taken == [True] * 10 + [False] * 2 + [True] * 10 + [False] * 2
+    disk.go_on.set()
+    assert log.close()
+    assert read(log.path)["number"]["value"].tolist() == [*range(11), *range(13, 23)]
+    assert log.dropped == 4
+
+
 def test_a_patient_writer_waits_for_room(tmp_path, monkeypatch):
     disk = SlowDisk(monkeypatch)
     log = new_log(tmp_path / "log.mcap", queue_length=10)

@@ -74,9 +74,9 @@ class Recorder:
         self._channels[topic] = self._writer.add_channel(topic, type_name, definition, offered(qos))
         return self._channels[topic]
 
-    def write(self, channel: int, time: float, data: bytes, wait: bool = False) -> None:
+    def write(self, channel: int, time: float, data: bytes, wait: bool = False, essential: bool = False) -> None:
         """Record a serialised message of a simulation time [s]; one that finds no room is counted, not waited for."""
-        self._writer.write(channel, round(time * 1e9), data, wait)
+        self._writer.write(channel, round(time * 1e9), data, wait, essential)
 
     def close(self) -> None:
         """Write the rest and end the file."""

@@ -160,7 +160,7 @@ class LogWriter:
             self._sequence[number] = 0
         return number
 
-    def write(self, channel: int, log_time_ns: int, data: bytes, wait: bool = False) -> bool:
+    def write(self, channel: int, log_time_ns: int, data: bytes, wait: bool = False, essential: bool = False) -> bool:
         """Take a message; false if it is dropped. Costs about a microsecond and never waits, unless told to.
 
         Parameters
@@ -173,6 +173,8 @@ class LogWriter:
             The message in CDR.
         wait : bool
             Wait for room in the queue rather than drop the message.
+        essential : bool
+            Use the room that is kept for such messages, as much again as the queue has.
 
         Raises
         ------
@@ -181,14 +183,15 @@ class LogWriter:
         """
         if not 0 <= log_time_ns < LATEST_TIME:
             raise RecordingError(f"log time {log_time_ns} ns: allowed are 0 to 2^63 - 1")
+        limit = self._queue_length * (2 if essential else 1)
         with self._lock:
-            if wait and len(self._queue) >= self._queue_length:
-                self._room.wait_for(lambda: self._closing or len(self._queue) < self._queue_length)
+            if wait and len(self._queue) >= limit:
+                self._room.wait_for(lambda: self._closing or len(self._queue) < limit)
             try:
                 sequence = self._sequence[channel] = self._sequence[channel] + 1 & 0xFFFFFFFF
             except KeyError:
                 raise RecordingError(f"channel {channel}: allowed are those that add_channel gave") from None
-            if self._closing or len(self._queue) >= self._queue_length:
+            if self._closing or len(self._queue) >= limit:
                 self.dropped += 1
                 return False
             self._queue.append((channel, sequence, log_time_ns, log_time_ns, data))

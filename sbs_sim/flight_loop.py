@@ -26,6 +26,7 @@ from sbs_sim.simulation import Event, Simulation, Snapshot
 
 QUEUE_LENGTH = 100  # snapshots between the flight and their reader: one second at 100 Hz
 HURRY_TICKS = 10  # the schedule is kept by hurrying up to this many ticks; beyond, real time is lost for good
+READER_PATIENCE = 2.0  # s in which a reader takes a report, if there is one
 IDLE_PERIOD = 0.1  # s of wall time between reports while paused
 RATE_WINDOW = 1.0  # s of wall time over which the real-time factor is measured
 MOST_STEP_TICKS = 1_000  # some half a second of wall time for which other services wait
@@ -122,11 +123,13 @@ class FlightLoop:
             self._wake.notify()
         if self._thread.is_alive():
             self._thread.join()
+        patience = READER_PATIENCE  # none of the reports is lost on a reader that is only slow
         while True:
             try:
-                self.reports.put_nowait(None)
+                self.reports.put(None, timeout=patience)
                 return
             except queue.Full:  # there is no reader any more: the end matters more than the oldest report
+                patience = 0.0
                 with contextlib.suppress(queue.Empty):
                     self.reports.get_nowait()
 

@@ -1,12 +1,12 @@
 """Flights and their logs: real processes, real DDS, real files."""
 
+import datetime
 import itertools
 import math
 import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -42,6 +42,7 @@ from sbs_msgs.msg import (  # noqa: E402
 from sbs_msgs.srv import Reset, SetWind, Step, Trim  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
+from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
 
 DEGREE = math.radians(1.0)
 STATE_TOPICS = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "odom": Odometry, "/clock": Clock}
@@ -196,6 +197,32 @@ def test_a_full_disk_does_not_stop_the_flight(tmp_path, hover):
     assert len(read(tmp_path / "a.mcap")["state"].time_ns) > 10
 
 
+def test_a_disk_that_is_full_at_the_very_end_is_told(tmp_path):
+    with world(next(DOMAINS), tmp_path) as made:
+        made.client.watch("status", SimulationStatus)
+        simulator = made.start("simulator", record=tmp_path / "a.mcap", components="[simulator, recorder]")
+        made.client.next("status", lambda message: message.sim_time > 0.5)
+        import resource
+
+        size = (tmp_path / "a.mcap").stat().st_size + 500
+        resource.prlimit(simulator.pid, resource.RLIMIT_FSIZE, (size, size))
+        assert simulator.interrupt() == 0
+    assert f"the log ends before the flight: cannot write {tmp_path / 'a.mcap'}: File too large" in simulator.output
+
+
+def test_an_interruption_in_a_long_computation_leaves_a_whole_log(tmp_path):
+    with world(next(DOMAINS), tmp_path) as made:
+        made.client.watch("status", SimulationStatus)
+        simulator = made.start("simulator", record=tmp_path / "a.mcap")
+        made.client.next("status")
+        service = made.client.node.create_client(Trim, "trim")
+        made.client.until(service.service_is_ready, "trim")
+        service.call_async(Trim.Request(airspeed=95.0, azimuth_count=1000))  # half a minute of arithmetic
+        made.client.spin(0.5)
+        assert simulator.interrupt() == 0
+    assert read(tmp_path / "a.mcap").complete
+
+
 def test_what_was_recorded_before_a_kill_can_be_read_after_it(tmp_path, hover):
     with world(next(DOMAINS), tmp_path) as made:
         states = made.client.watch("state", BodyState)
@@ -272,19 +299,19 @@ def test_a_flight_as_fast_as_it_goes_comes_again_and_nothing_is_left_out(tmp_pat
 
 
 def test_a_flight_under_load_comes_again_bit_for_bit(tmp_path, hover):
-    stop = threading.Event()
-    burners = [
-        subprocess.Popen([sys.executable, "-c", "while True: pass"], stdout=subprocess.DEVNULL)
-        for _ in range(2 * (os.cpu_count() or 1))
-    ]
-    try:
-        path = fly(tmp_path, lambda made: wiggle(made, hover, 1.0))
-    finally:
-        stop.set()
-        for burner in burners:
-            burner.kill()
-            burner.wait()
-    assert_identical(path)
+    def act(made):
+        burners = [
+            subprocess.Popen([sys.executable, "-c", "while True: pass"], stdout=subprocess.DEVNULL)
+            for _ in range(2 * (os.cpu_count() or 1))
+        ]
+        try:
+            wiggle(made, hover, 1.0)
+        finally:
+            for burner in burners:
+                burner.kill()
+                burner.wait()
+
+    assert_identical(fly(tmp_path, act))
 
 
 def test_commands_past_the_mixer_come_again(tmp_path, hover):
@@ -349,8 +376,8 @@ def recorded(tmp_path_factory, hover):
     return fly(tmp_path_factory.mktemp("recorded"), lambda made: wiggle(made, hover, 1.5))
 
 
-def play(tmp_path, path, *arguments, act=lambda made: None):
-    """Messages that a subscriber gets of a replay, and how long it took."""
+def play(tmp_path, path, *arguments, act=lambda made: None, code=0):
+    """Messages that a subscriber gets of a replay, and what it printed."""
     with world(next(DOMAINS), tmp_path) as made:
         received = {topic: made.client.watch(topic, kind) for topic, kind in STATE_TOPICS.items()}
         received["events"] = made.client.watch("events", FlightEvent)
@@ -365,14 +392,14 @@ def play(tmp_path, path, *arguments, act=lambda made: None):
             made.client.spin(0.3)
         finally:
             process.kill()
-            process.wait(PATIENCE)
-        assert process.returncode == 0, process.stderr.read()
-    return received
+            _, output = process.communicate(timeout=PATIENCE)
+        assert process.returncode == code, output
+    return received, output
 
 
 def test_replay_publishes_what_was_recorded(tmp_path, recorded):
     heard = ("--delay", 30, "--topics", *STATE_TOPICS)
-    received, log = play(tmp_path, recorded, *heard), read(recorded)
+    (received, _), log = play(tmp_path, recorded, *heard), read(recorded)
     stamps = [message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in received["state"]]
     assert stamps == log["state"].time_ns.tolist()
     assert received["/clock"]
@@ -380,7 +407,7 @@ def test_replay_publishes_what_was_recorded(tmp_path, recorded):
 
 
 def test_replay_of_a_part_and_of_some_topics(tmp_path, recorded):
-    received = play(tmp_path, recorded, "--start", 0.5, "--end", 1.0, "--delay", 30, "--topics", "state", "/odom")
+    received, _ = play(tmp_path, recorded, "--start", 0.5, "--end", 1.0, "--delay", 30, "--topics", "state", "/odom")
     stamps = [message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec for message in received["state"]]
     assert min(stamps) >= 0.5
     assert max(stamps) <= 1.0 + 1e-6
@@ -398,7 +425,7 @@ def test_replay_can_be_paused(tmp_path, recorded):
         assert len(made.client.messages["state"]) == count
         assert made.client.call(SetBool, "pause", data=False).success
 
-    received = play(tmp_path, recorded, "--rate", 0.5, act=act)
+    received, _ = play(tmp_path, recorded, "--rate", 0.5, act=act)
     assert received["state"][-1].position.z == read(recorded)["state"]["position.z"][-1]
 
 
@@ -426,6 +453,8 @@ def test_replay_again_and_again_until_it_is_ended(tmp_path, recorded):
         (["nothing.mcap"], 1, "nothing.mcap"),
         (["--rate", "0", "x.mcap"], 2, "--rate 0.0: allowed are 0.001 to 1000"),
         (["--start", "3", "--end", "1", "x.mcap"], 2, "--start 3.0"),
+        (["--end", "nan", "x.mcap"], 2, "--end nan"),
+        (["x.mcap", "--output", "y.mcap"], 2, "--output: allowed with --recover and --with"),
         (["--verify", "nothing.mcap"], 1, "nothing.mcap"),
         (["--recover", "nothing.mcap"], 1, "nothing.mcap"),
         (["--verify", "--recover", "x.mcap"], 2, "not allowed with"),
@@ -438,6 +467,79 @@ def test_bad_arguments_are_named(arguments, code, text):
     assert "Traceback" not in found.stderr
 
 
+@pytest.mark.parametrize("seconds", [0.5, 2.0])
+def test_an_interrupted_command_leaves_nothing_and_says_nothing(tmp_path, recorded, seconds):
+    """Whatever it is at; the machine decides what that is."""
+    for number, mode in enumerate((["--with", "body.mass=23"], ["--recover"], ["--verify"])):
+        output = tmp_path / f"{number}.mcap"
+        extra = [] if mode == ["--verify"] else ["--output", str(output)]
+        command = [sys.executable, str(EXECUTABLES / "replay"), str(recorded), *mode, *extra]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        time.sleep(seconds)
+        process.send_signal(signal.SIGINT)
+        printed, _ = process.communicate(timeout=PATIENCE)
+        if process.returncode == 130:
+            assert printed == ""
+            assert not output.exists()
+        else:  # it had ended, or Python itself had only begun
+            assert process.returncode in (0, -signal.SIGINT)
+
+
+def test_a_flight_that_did_not_fit_on_the_disk_is_an_error(tmp_path, recorded):
+    command = [sys.executable, str(EXECUTABLES / "replay"), "--with", "body.mass=23", str(recorded)]
+    limit = Path(recorded).stat().st_size * 2 // 3
+
+    def limited():
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    output = tmp_path / "heavy.mcap"
+    command += ["--output", str(output)]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False, preexec_fn=limited)
+    assert found.returncode == 1
+    assert found.stderr == f"cannot write {output}: File too large\n"
+    assert found.stdout == ""
+
+
+def test_what_a_cut_log_is_compared_with_is_said(tmp_path, recorded):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(Path(recorded).read_bytes()[: Path(recorded).stat().st_size * 3 // 4])
+    found = replay("--verify", cut)
+    assert found.returncode == 0
+    assert "identical" in found.stdout
+    assert found.stderr.startswith(f"{cut} is not whole: ")
+    assert len(found.stderr.splitlines()) == 1
+
+
+def test_a_log_without_states_is_no_flight(tmp_path):
+    """As a simulator leaves it that is ended at once."""
+    from sbs_sim.nodes.recorder import Recorder
+    from sbs_sim.simulation import Simulation, trimmed_state
+
+    aircraft = Aircraft.load("sbs")
+    point = trim(aircraft)
+    Recorder(
+        str(tmp_path / "a.mcap"), Simulation(aircraft, trimmed_state(aircraft, point), point.swashplate), {}
+    ).close()
+    found = replay("--verify", tmp_path / "a.mcap")
+    assert found.returncode == 1
+    assert found.stderr.startswith("the log holds no flight of sbs_sim")
+    assert len(found.stderr.splitlines()) == 1
+
+
+def test_two_logs_of_a_second_have_two_names(tmp_path):
+    from sbs_sim.nodes.recorder import log_path
+
+    begin = datetime.datetime(2024, 5, 6, 7, 8, 9)
+    names = []
+    for _ in range(3):
+        path = log_path(str(tmp_path), "sbs", begin)
+        path.write_bytes(b"")
+        names.append(path.name)
+    assert names == [f"2024-05-06_07-08-09_sbs{end}.mcap" for end in ("", "_2", "_3")]
+
+
 def test_unknown_topics_are_named(recorded):
     found = replay("--topics", "altitude", "--", recorded)
     assert found.returncode == 1
@@ -445,15 +547,89 @@ def test_unknown_topics_are_named(recorded):
     assert "/state" in found.stderr
 
 
-def test_a_damaged_log_is_told_in_one_line(tmp_path, recorded):
+def test_a_damaged_log_is_played_up_to_the_damage(tmp_path, recorded):
+    """Nothing wrong is published; one line and the exit code tell of it."""
     damaged = tmp_path / "damaged.mcap"
     data = bytearray(Path(recorded).read_bytes())
-    for place in range(len(data) // 2, len(data) * 9 // 10):  # so much that whole chunks are hit, not an index alone
-        data[place] ^= 0xFF
+    with Source(recorded) as source:
+        chunks = sorted(read_summary(source).chunks)
+    data[chunks[len(chunks) * 2 // 3] + 200] ^= 1
     damaged.write_bytes(data)
-    found = replay(damaged, domain=next(DOMAINS))
-    assert "Traceback" not in found.stderr
-    assert "--recover" in found.stderr
+    received, output = play(tmp_path, damaged, "--rate", 5, "--delay", 30, "--topics", *STATE_TOPICS, code=1)
+    heights, expected = [message.position.z for message in received["state"]], read(recorded)["state"]["position.z"]
+    assert 10 < len(heights) < len(expected)
+    assert heights == expected[: len(heights)].tolist()
+    assert len(output.splitlines()) == 1
+    assert f"replay --recover {damaged}" in output
+
+
+def test_a_log_of_another_writer_is_played(tmp_path):
+    """Without checksums, and with topics that cannot be published: those are left out, and named."""
+    from mcap.writer import Writer
+    from rclpy.serialization import serialize_message
+
+    from sbs_sim.nodes.recorder import definition_file
+    from sbs_sim.recording import message_definition
+
+    def publish(writer, topic, type_name, encoding, definition, data):
+        schema = writer.register_schema(type_name, "ros2msg", definition.encode()) if type_name else 0
+        channel = writer.register_channel(topic, encoding, schema)
+        for i in range(20):
+            writer.add_message(channel, 1_700_000_000_000_000_000 + i * 20_000_000, data(i), 0)
+
+    path = tmp_path / "other.mcap"
+    left_out = {
+        "/json": ("", "json", "", "no ROS 2 messages"),
+        "/one": ("std_msgs/String", "ros1", "string data", "no ROS 2 messages"),
+        "/strange": ("strange_msgs/msg/Thing", "cdr", "int32 thing", "is not installed"),
+        "/nameless": ("/", "cdr", "int32 thing", "is not installed"),
+        "/bad name": ("std_msgs/msg/Bool", "cdr", "bool data", "ROS does not allow this name"),
+        "/flag": ("std_msgs/msg/Bool", "cdr", "float64 data", "installed with other fields"),
+    }
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=500, enable_crcs=False)
+        writer.start("ros2", "somebody")
+        definition = message_definition("sbs_msgs/msg/BodyState", definition_file)
+        body = BodyState()
+
+        def state(i):
+            body.position.z = float(i)
+            return serialize_message(body)
+
+        publish(writer, "state", "sbs_msgs/msg/BodyState", "cdr", definition, state)
+        for topic, (type_name, encoding, text, _) in left_out.items():
+            publish(writer, topic, type_name, encoding, text, lambda i: b"\0\1\0\0\1")
+        writer.finish()
+    received, output = play(tmp_path, path, "--delay", 30)
+    assert [message.position.z for message in received["state"]] == [float(i) for i in range(20)]
+    assert "other.mcap has no checksums" in output
+    for topic, (*_, why) in left_out.items():
+        assert any(f"{topic}: left out" in line and why in line for line in output.splitlines()), output
+    assert "Traceback" not in output
+
+
+def test_a_loop_over_an_instant_is_no_flood(tmp_path, recorded):
+    with world(next(DOMAINS), tmp_path) as made:
+        states = made.client.watch("state", BodyState)
+        part = ["--start", "1", "--end", "1.005", "--loop", "--topics", "state"]
+        command = [sys.executable, str(EXECUTABLES / "replay"), str(recorded), *part]
+        process = subprocess.Popen(command, env=environment(made.domain))
+        try:
+            made.client.until(lambda: states, "a state")
+            begin, before = time.monotonic(), len(states)
+            made.client.until(lambda: len(states) >= before + 20, "20 passes")
+            assert time.monotonic() - begin > 0.5  # 1 s, and no less if the machine is slow
+        finally:
+            process.kill()
+            process.wait(PATIENCE)
+
+
+def test_nothing_to_play_is_an_error(recorded):
+    for arguments in (["--start", "1000"], ["--start", "1000", "--loop"], ["--topics", "trim_point", "--"]):
+        found = replay(*arguments, recorded, domain=next(DOMAINS))
+        assert found.returncode == 1
+        assert "there is nothing to play" in found.stderr
+        assert len(found.stderr.splitlines()) == 1
 
 
 def test_the_log_that_comes_along_is_flown_again():

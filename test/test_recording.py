@@ -21,7 +21,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.records import Schema
-from mcap.writer import Writer
+from mcap.writer import CompressionType, IndexType, Writer
 from ruamel.yaml import YAML
 
 from sbs_sim.errors import RecordingError
@@ -30,7 +30,8 @@ from sbs_sim.recording.cdr import Layout, decode, decode_one_by_one
 from sbs_sim.recording.definitions import SEQUENCE, Units, fields_of, parse, short_name
 from sbs_sim.recording.mcap_file import NewFile
 from sbs_sim.recording.mcap_log import CHUNK_SIZE
-from sbs_sim.recording.scan import LARGEST, Source, scan
+from sbs_sim.recording.playback import Playback
+from sbs_sim.recording.scan import LARGEST, Source, read_summary, scan
 from sbs_sim.simulation import Simulation, trimmed_state
 
 TOOL = Path(__file__).resolve().parent.parent / "tools" / "crash_recording.py"
@@ -570,52 +571,136 @@ def test_a_pandas_frame_has_a_column_for_every_place_of_a_list(flight, monkeypat
     assert all(values.shape == (TICKS,) for values in columns.values())
 
 
-def test_files_of_other_writers_are_read(tmp_path):
-    """Of the package's own writer, which has no checksum of the whole."""
-    path = tmp_path / "other.mcap"
+def foreign_log(path, messages=200, metadata=False, **options):
+    """File of the package's own writer."""
     with path.open("wb") as file:
-        writer = Writer(file, chunk_size=1000)
+        writer = Writer(file, chunk_size=1000, **options)
         writer.start(profile="ros2", library="other")
+        if metadata:
+            writer.add_metadata("notes", {"pilot": "somebody"})
+            writer.add_attachment(1, 1, "notes.txt", "text/plain", b"content")
         schema = writer.register_schema("test_msgs/msg/Number", "ros2msg", NUMBER.encode())
         channel = writer.register_channel("/number", "cdr", schema)
-        for number in range(200):
+        for number in range(messages):
             writer.add_message(channel, number, number_message(number), number)
+        writer.finish()
+    return path
+
+
+WITHOUT = {"index_types": IndexType.NONE, "repeat_channels": False, "repeat_schemas": False, "use_statistics": False}
+WITHOUT["use_summary_offsets"] = False
+OTHER_WRITERS = {
+    "as it comes": ({}, ""),
+    "lz4": ({"compression": CompressionType.LZ4}, ""),
+    "no summary": (WITHOUT, ""),
+    "metadata": ({"metadata": True}, "metadata"),
+    "metadata, checksum of all": ({"metadata": True, "enable_data_crcs": True}, ""),
+    "no checksums": ({"enable_crcs": False}, "messages"),
+    "no checksums, metadata": ({"enable_crcs": False, "metadata": True}, "messages, metadata"),
+    "no checksums, lz4": ({"enable_crcs": False, "compression": CompressionType.LZ4}, "messages"),
+    "no checksums, not packed": ({"enable_crcs": False, "compression": CompressionType.NONE}, "messages"),
+    "no chunks": ({"use_chunking": False}, "messages"),
+    "no chunks, no summary": ({"use_chunking": False, "enable_crcs": False, **WITHOUT}, "messages"),
+}
+
+
+@pytest.mark.parametrize("case", OTHER_WRITERS)
+def test_files_of_other_writers_are_read(tmp_path, case):
+    """What has no checksum is taken as it is, and said; in the recovered file everything has one."""
+    options, unchecked = OTHER_WRITERS[case]
+    path = foreign_log(tmp_path / "other.mcap", **options)
+    log = read(path)
+    assert log.complete
+    assert log.reasons == ((f"no checksums, so that damage cannot be found: {unchecked}",) if unchecked else ())
+    assert log["number"]["value"].tolist() == list(range(200))
+    assert log.metadata == ({"notes": {"pilot": "somebody"}} if "metadata" in options else {})
+    assert log.attachments == ({"notes.txt": b"content"} if "metadata" in options else {})
+    recovery = recover(path, tmp_path / "new.mcap")
+    assert (recovery.messages, recovery.complete, recovery.reasons) == (200, True, log.reasons)
+    assert read(tmp_path / "new.mcap").reasons == ()
+
+
+def test_what_rosbags_writes_is_read(tmp_path):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    kind = store.types["std_msgs/msg/String"]
+    with rosbag2.Writer(tmp_path / "bag", version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/text", kind.__msgtype__, typestore=store)
+        for number in range(50):
+            writer.write(connection, number, store.serialize_cdr(kind(data="x" * number), kind.__msgtype__))
+    log = read(tmp_path / "bag" / "bag.mcap")
+    assert log.complete
+    assert log["text"]["data"].tolist() == ["x" * number for number in range(50)]
+
+
+def test_topics_without_type_and_with_several_publishers(tmp_path):
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="other")
+        schema = writer.register_schema("test_msgs/msg/Number", "ros2msg", NUMBER.encode())
+        odd = {"offered_qos_profiles": "[: no YAML"}
+        channels = [writer.register_channel("/number", "cdr", schema, metadata) for metadata in ({}, odd)]
+        text = writer.register_channel("/text", "json", 0)
+        for number in range(10):
+            writer.add_message(channels[number % 2], number, number_message(number), number)
+            writer.add_message(text, number, b"{}", number)
         writer.finish()
     log = read(path)
-    assert (log.complete, log.reasons) == (True, ())
-    assert log["number"]["value"].tolist() == list(range(200))
-    assert recover(path, tmp_path / "new.mcap").messages == 200
+    assert (log.complete, log.reasons) == (True, ("topic /text has no type and is left out",))
+    assert log.topics == ("/number",)
+    assert log["number"]["value"].tolist() == list(range(10))
+    assert recover(path, tmp_path / "new.mcap").messages == 20
 
 
-def test_a_file_without_checksums_is_not_trusted(tmp_path):
-    path = tmp_path / "other.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file, enable_crcs=False)
-        writer.start(profile="ros2", library="other")
-        schema = writer.register_schema("test_msgs/msg/Number", "ros2msg", NUMBER.encode())
-        writer.add_message(writer.register_channel("/number", "cdr", schema), 1, number_message(1), 1)
-        writer.finish()
-    with pytest.raises(RecordingError, match=r"nothing in .* can be read: .* a chunk has no checksum to trust"):
-        read(path)
+@pytest.mark.parametrize("options", [{"enable_crcs": False}, {"use_chunking": False}])
+def test_a_cut_file_without_checksums_is_read_up_to_there(tmp_path, options):
+    path = foreign_log(tmp_path / "other.mcap", compression=CompressionType.NONE, **options)
+    path.write_bytes(path.read_bytes()[:5000])
+    log = read(path)
+    values = log["number"]["value"].tolist()
+    assert not log.complete
+    assert "the recording was not closed: it has no end" in log.reasons
+    assert 50 < len(values) < 200
+    assert values == list(range(len(values)))
 
 
-def test_messages_outside_of_chunks_have_no_checksum_to_trust(tmp_path):
-    path = tmp_path / "other.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file, use_chunking=False)
-        writer.start(profile="ros2", library="other")
-        schema = writer.register_schema("test_msgs/msg/Number", "ros2msg", NUMBER.encode())
-        channel = writer.register_channel("/number", "cdr", schema)
-        for number in range(1000):
-            writer.add_message(channel, number, number_message(number), number)
-        writer.finish()
+@pytest.mark.parametrize("which", [0, 1, -1])
+def test_a_chunk_that_lost_its_checksum_is_not_trusted(tmp_path, original, which):
+    """In a file whose other chunks have one; of ours not even if no chunk has."""
+    path = foreign_log(tmp_path / "other.mcap")
+    with Source(path) as source:
+        places = sorted(read_summary(source).chunks)
+    damaged = bytearray(path.read_bytes())
+    damaged[places[which] + 33 : places[which] + 37] = bytes(4)
+    (tmp_path / "damaged.mcap").write_bytes(damaged)
+    log = read(tmp_path / "damaged.mcap")
+    assert not log.complete
+    assert any("no checksum to trust" in reason for reason in log.reasons)
+    assert 0 < len(log["number"].time) < 200
+    damaged = bytearray(original.data)
+    for start, _ in original.chunks:
+        damaged[start + 33 : start + 37] = bytes(4)
+    (tmp_path / "damaged.mcap").write_bytes(damaged)
+    with pytest.raises(RecordingError, match=r"nothing in .* can be read"):
+        read(tmp_path / "damaged.mcap")
+
+
+def test_a_long_list_of_damages_is_cut(tmp_path):
+    path = foreign_log(tmp_path / "other.mcap", messages=8000)
+    data = bytearray(path.read_bytes())
+    with Source(path) as source:
+        places = sorted(read_summary(source).chunks)
+    for place in places:
+        data[place + 33] ^= 1
+    path.write_bytes(data)
     with Source(path) as source:
         found = scan(source, lambda content: None)
     assert not found.complete
+    assert len(places) > 150
     assert len(found.reasons) == 101
-    assert found.reasons[-1] == "900 more places like these"
-    with pytest.raises(RecordingError, match=r"nothing in .* can be read: .* a message without a checksum"):
-        read(path)
+    assert found.reasons[-1] == f"{len(places) - 100} more places like these"
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"no recording\n" * 1000, bytes(5000)])
@@ -633,6 +718,77 @@ def test_what_cannot_be_opened_is_refused_in_one_line(tmp_path):
         read(tmp_path / "nothing.mcap")
     with pytest.raises(RecordingError, match=r"cannot read .*: Is a directory$"):
         read(tmp_path)
+
+
+# -- reading to play ---------------------------------------------------------------------------------
+
+
+def played(path, *part):
+    with Playback(path) as playback:
+        return [(log_time, data) for log_time, _, data in playback.messages(*part)]
+
+
+@pytest.mark.parametrize("case", OTHER_WRITERS)
+def test_what_is_played_is_what_is_read(tmp_path, case):
+    options, unchecked = OTHER_WRITERS[case]
+    path = foreign_log(tmp_path / "other.mcap", **options)
+    assert played(path) == [(number, number_message(number)) for number in range(200)]
+    with Playback(path) as playback:
+        assert bool(playback.warning) == ("messages" in unchecked)
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+def test_messages_are_played_in_the_order_of_their_time(tmp_path, chunked):
+    """Of several chunks that overlap, and messages of equal time as they were written."""
+    path = tmp_path / "other.mcap"
+    times = [number + random.Random(number).randrange(-150, 150) * (number % 3) for number in range(1000, 2000)]
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=1000, use_chunking=chunked)
+        writer.start(profile="ros2", library="other")
+        schema = writer.register_schema("test_msgs/msg/Number", "ros2msg", NUMBER.encode())
+        channel = writer.register_channel("/number", "cdr", schema)
+        for number, log_time in enumerate(times):
+            writer.add_message(channel, log_time * 10**6, number_message(number), 0)
+        writer.finish()
+    expected = sorted((log_time * 10**6, number) for number, log_time in enumerate(times))
+    assert played(path) == [(log_time, number_message(number)) for log_time, number in expected]
+    begin = expected[0][0]
+    part = [item for item in expected if 300 * 10**6 <= item[0] - begin <= 500 * 10**6]
+    assert played(path, 0.3, 0.5) == [(log_time, number_message(number)) for log_time, number in part]
+
+
+def test_playing_begins_at_once_and_ends_before_a_damage(original, tmp_path):
+    """What is played later is not read before; a damage before the part that is played does no harm."""
+    path = tmp_path / "whole.mcap"
+    path.write_bytes(original.data)
+    whole = played(path)
+    assert {data for _, data in whole} == set(original.messages.values())
+    (start, end), keys = sorted(original.chunks.items())[3]
+    data = bytearray(original.data)
+    data[end - 5] ^= 1
+    path = tmp_path / "damaged.mcap"
+    path.write_bytes(data)
+    found = []
+
+    def play():
+        with Playback(path) as playback:
+            found.extend((log_time, content) for log_time, _, content in playback.messages())
+
+    with pytest.raises(RecordingError, match=rf"is damaged \(byte {start}: .*--recover"):
+        play()
+    assert found == whole[: len(found)]
+    assert len(found) >= sum(len(item) for place, item in original.chunks.items() if place < (start, end)) - 6
+    last = max(log_time for log_time, content in whole if content in {original.messages[key] for key in keys})
+    later = played(path, (last - whole[0][0]) / 1e9 + 0.005)
+    assert later
+    assert later == whole[-len(later) :]
+
+
+def test_what_is_not_whole_is_not_played(original, tmp_path):
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(original.data[:-30_000])
+    with pytest.raises(RecordingError, match=r"cut.mcap is not whole \(.*: `replay --recover"):
+        Playback(path)
 
 
 # -- writing -----------------------------------------------------------------------------------------
@@ -701,6 +857,22 @@ def test_a_slow_disk_never_blocks_and_what_is_dropped_is_counted(tmp_path, monke
     found = read(log.path)
     assert found["number"]["value"].tolist() == list(range(101))
     assert found.metadata["recording_end"] == {"written": "101", "dropped": "200"}
+
+
+def test_there_is_room_for_what_is_essential(tmp_path, monkeypatch):
+    """It is neither waited for nor dropped when the rest is."""
+    disk = SlowDisk(monkeypatch)
+    log = new_log(tmp_path / "log.mcap", queue_length=10)
+    channel = add_number(log)
+    log.write(channel, 0, number_message(0))
+    assert disk.waiting.wait(10)
+    taken = [log.write(channel, number, number_message(number)) for number in range(1, 13)]
+    taken += [log.write(channel, number, number_message(number), essential=True) for number in range(13, 25)]
+    assert taken == [True] * 10 + [False] * 2 + [True] * 10 + [False] * 2
+    disk.go_on.set()
+    assert log.close()
+    assert read(log.path)["number"]["value"].tolist() == [*range(11), *range(13, 23)]
+    assert log.dropped == 4
 
 
 def test_a_patient_writer_waits_for_room(tmp_path, monkeypatch):

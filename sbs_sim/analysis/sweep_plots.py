@@ -26,11 +26,10 @@ from sbs_sim.analysis.modes import Mode
 from sbs_sim.analysis.sweep import CONDITIONS, Sweep
 from sbs_sim.errors import ExportError
 from sbs_sim.model.state import CONTROL_NAMES, part_of
+from sbs_sim.plot_style import COLOURS, DASHES
 
 Array = NDArray[np.float64]
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-DASHES = ("-", "--", "-.", ":")
 FORMATS = ("png", "svg")
 DOTS_PER_INCH = 150
 LEAST_ANGLE, LEAST_SHARE = 1.0, 0.05  # that an axis covers: deg, share of the largest value

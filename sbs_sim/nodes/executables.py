@@ -6,6 +6,7 @@ They import next to nothing, so that Ctrl-C is obeyed at once while the compiled
 import os
 import signal
 
+INTERRUPTED = 128 + signal.SIGINT  # exit code of what was not meant to run until Ctrl-C
 # The matrices are small: threads of numpy and scipy would gain nothing, and take the cores that the flight needs.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -36,12 +37,13 @@ def analysis() -> None:
 
 def replay() -> None:
     """Run the executable `replay`."""
+    _end_at_once_when_interrupted(INTERRUPTED)
     from sbs_sim.nodes.replay import main
 
     main()
 
 
-def _end_at_once_when_interrupted() -> None:
+def _end_at_once_when_interrupted(code: int = 0) -> None:
     """Until the nodes run there is nothing to be ended in good order: `sbs_sim.nodes.host.run` takes over then."""
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: os._exit(0))
+        signal.signal(number, lambda *_: os._exit(code))

@@ -63,7 +63,7 @@ class Log(Protocol):
     def channel(self, topic: str, kind: Any, qos: QoSProfile) -> int:
         """Channel for the messages of a topic."""
 
-    def write(self, channel: int, time: float, data: bytes, wait: bool = False) -> None:
+    def write(self, channel: int, time: float, data: bytes, wait: bool = False, essential: bool = False) -> None:
         """Record a serialised message of a simulation time [s]."""
 
 
@@ -85,12 +85,12 @@ class Topic:
         self._log = log
         self._channel = log.channel(self._publisher.topic_name, kind, qos) if log else 0
 
-    def publish(self, message: Any, time: float, wait: bool = False) -> None:
-        """Publish a message of a simulation time [s]; `wait` for room in the log if it must not be left out."""
+    def publish(self, message: Any, time: float, wait: bool = False, essential: bool = False) -> None:
+        """Publish a message of a simulation time [s]; for `wait` and `essential` see `LogWriter.write`."""
         data = serialize_message(message)
         self._publisher.publish(data)
         if self._log is not None:
-            self._log.write(self._channel, time, data, wait)
+            self._log.write(self._channel, time, data, wait, essential)
 
 
 class Accepted:
@@ -121,6 +121,9 @@ class Component(Node):
 
     def stop(self) -> None:
         """Let go of what a callback may be waiting for; called once, before the node's thread is joined."""
+
+    def finish(self) -> None:
+        """Bring to an end what must not be lost; called once, after `stop` and after the node's thread."""
 
     def answer(self, response: Any, act: Callable[[], Any], done: str) -> Any:
         """Carry out a request and say how it went; an error changes nothing and is told."""
@@ -277,6 +280,8 @@ def run(
             threads += node.workers
         for thread in threads:
             thread.join(END_PATIENCE)
+        for node in nodes:
+            node.finish()
         if any(thread.is_alive() for thread in threads):
             os._exit(0)  # deep in a computation, which cannot be interrupted and whose result nobody wants any more
         for node in reversed(nodes):

@@ -15,6 +15,8 @@ from sbs_sim.flight_loop import FlightLoop, Report
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
 from sbs_sim.nodes.host import EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Refusals, Topic, diagnostic
 
+PUBLISHING_TIME = 10.0  # s for what is still to be published at the end
+
 if TYPE_CHECKING:
     from sbs_sim.nodes.recorder import Recorder
 
@@ -53,8 +55,8 @@ class Outputs:
         self._thread.start()
 
     def join(self) -> None:
-        """Wait until the last report of a stopped loop is out."""
-        self._thread.join()
+        """Wait until the last report of a stopped loop is out, if the log does not hold it up for good."""
+        self._thread.join(PUBLISHING_TIME)
 
     def _publish_all(self) -> None:
         while (report := self._loop.reports.get()) is not None:
@@ -66,7 +68,8 @@ class Outputs:
             self._clock_message.clock = stamp
             self._clock.publish(self._clock_message, now, wait)
             for event in report.events:
-                self._events.publish(event_message(event, self._loop.step_size), now, True)  # no flight without them
+                # no flight can be flown again without them
+                self._events.publish(event_message(event, self._loop.step_size), now, wait, essential=True)
             if report.snapshot is not None:
                 self._messages.fill(report.snapshot)
                 self._state.publish(self._messages.state, now, wait)
@@ -95,15 +98,15 @@ class Outputs:
         before, log = self._last_report, self._node.get_logger()
         if report.fault and (before is None or report.fault != before.fault):
             log.error(f"paused: {report.fault}")
-        self._say_log_fault()
+        self.say_log_fault()
         if report.command_timed_out and (before is None or not before.command_timed_out):
             log.warning(f"no command for {self._loop.command_timeout:g} s: holding the last one")
 
-    def _say_log_fault(self) -> None:
-        """One log line when the recording fails."""
+    def say_log_fault(self) -> None:
+        """One log line when the recording has failed."""
         if self._log is not None and self._log.fault and not self._log_fault_said:
             self._log_fault_said = True
-            self._node.get_logger().error(f"the flight goes on without its log: {self._log.fault}")
+            self._node.get_logger().error(f"the log ends before the flight: {self._log.fault}")
 
     def _publish_health(self) -> None:
         report = self._last_report

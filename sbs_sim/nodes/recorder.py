@@ -4,6 +4,7 @@ Not a node: messages come serialised from the publishers (`sbs_sim.nodes.host.To
 """
 
 import datetime
+import itertools
 import os
 from pathlib import Path
 from typing import Any
@@ -40,13 +41,14 @@ class Recorder:
         begin = datetime.datetime.now(datetime.timezone.utc).astimezone()
         self.path = log_path(record, simulation.aircraft.name, begin)
         self._channels: dict[str, int] = {}
+        own_versions = versions()
         self._writer = LogWriter(
             self.path,
-            library=f"sbs_sim {versions()['sbs_sim']}",
+            library=f"sbs_sim {own_versions['sbs_sim']}",
             wall_start=round(begin.timestamp() * 1e9),
             metadata={
                 "simulation": simulation_metadata(simulation),
-                "versions": versions(),
+                "versions": own_versions,
                 "parameters": {name: repr(value) for name, value in parameters.items()},
             },
             attachments=attachments(simulation.aircraft),
@@ -72,13 +74,18 @@ class Recorder:
         self._channels[topic] = self._writer.add_channel(topic, type_name, definition, offered(qos))
         return self._channels[topic]
 
-    def write(self, channel: int, time: float, data: bytes, wait: bool = False) -> None:
+    def write(self, channel: int, time: float, data: bytes, wait: bool = False, essential: bool = False) -> None:
         """Record a serialised message of a simulation time [s]; one that finds no room is counted, not waited for."""
-        self._writer.write(channel, round(time * 1e9), data, wait)
+        self._writer.write(channel, round(time * 1e9), data, wait, essential)
 
     def close(self) -> None:
         """Write the rest and end the file."""
         self._writer.close(CLOSING_TIME)
+
+    def discard(self) -> None:
+        """End the file and delete it."""
+        self.close()
+        self.path.unlink(missing_ok=True)
 
 
 def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
@@ -96,7 +103,9 @@ def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(f"{folder}: {error.strerror}") from None
-    return folder / f"{begin:%Y-%m-%d_%H-%M-%S}_{aircraft}.mcap"
+    name = f"{begin:%Y-%m-%d_%H-%M-%S}_{aircraft}"
+    others = (folder / f"{name}_{number}.mcap" for number in itertools.count(2))  # of the same second
+    return next(path for path in itertools.chain([folder / f"{name}.mcap"], others) if not path.exists())
 
 
 def definition_file(package: str, place: str) -> Path:

@@ -5,22 +5,21 @@ reads logs of other writers too, as long as their message types are installed.
 """
 
 import argparse
-import contextlib
 import importlib
 import itertools
-import struct
+import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+import traceback
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import rclpy.utilities
-from mcap.exceptions import McapError
-from mcap.reader import make_reader
-from mcap.records import Channel, Message
+from mcap.records import Channel, Schema
 from nav_msgs.msg import Odometry
+from rclpy.exceptions import NameValidationException
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
@@ -31,14 +30,19 @@ from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
+from sbs_sim.nodes.executables import INTERRUPTED
 from sbs_sim.nodes.host import EVENT_QOS, STATE_QOS, Component, run
-from sbs_sim.nodes.recorder import Recorder
-from sbs_sim.recording import read, recover
+from sbs_sim.nodes.recorder import Recorder, definition_file
+from sbs_sim.recording import Log, message_definition, read, recover
+from sbs_sim.recording.definitions import parse
 from sbs_sim.recording.flight import TOLERANCE, Flight, flight_of, verify
+from sbs_sim.recording.playback import Playback
 from sbs_sim.simulation import Simulation, refly
 
 LARGEST_RATE = 1000.0
 LONGEST_DELAY = 3600.0  # s
+EMPTY = "structure_needs_at_least_one_member"
+SHORTEST_PASS = 0.05  # s of wall time: a loop over an instant is no flood
 RECOVERED = ".recovered.mcap"
 
 
@@ -47,7 +51,7 @@ class Replay(Component):
 
     Parameters
     ----------
-    path : Path
+    playback : Playback
     rate : float
         Recorded time over wall time.
     start, end : float
@@ -60,11 +64,16 @@ class Replay(Component):
         Longest time to wait until somebody listens to every topic [s].
     ended : threading.Event
         Set at the end of the log.
+
+    Attributes
+    ----------
+    failure : str
+        Why the log could not be played to its end, in one line; empty if it was.
     """
 
     def __init__(
         self,
-        path: Path,
+        playback: Playback,
         rate: float,
         start: float,
         end: float,
@@ -75,7 +84,10 @@ class Replay(Component):
     ) -> None:
         super().__init__("replay")
         self._delay = delay
-        self._path, self._rate, self._start, self._end, self._loop = path, rate, start, end, loop
+        self._playback, self._rate, self._start, self._end, self._loop = playback, rate, start, end, loop
+        self.failure = ""
+        if playback.warning:
+            self.get_logger().warning(playback.warning)
         self._outputs = self._make_publishers(topics)
         self._wake = threading.Condition()
         self._paused = self._stopping = False
@@ -86,24 +98,29 @@ class Replay(Component):
 
     def _make_publishers(self, topics: Sequence[str]) -> dict[int, Any]:
         """Publisher of each channel that is wanted and whose type is installed."""
+        channels = self._playback.channels
+        if unknown := set(topics) - {name for channel in channels.values() for name in _names(channel)}:
+            names = ", ".join(sorted({channel.topic for channel in channels.values()}))
+            raise SbsError(f"--topics {min(unknown)}: the log has {names or 'none'}")
         found: dict[int, Any] = {}
-        by_topic: dict[str, Any] = {}
-        there = _channels(self._path)
-        known = {name for channel, _ in there for name in (channel.topic, channel.topic.lstrip("/"))}
-        if unknown := set(topics) - known:
-            names = ", ".join(sorted(channel.topic for channel, _ in there))
-            raise SbsError(f"--topics {min(unknown)}: the log has {names}")
-        for channel, type_name in there:
-            if topics and not {channel.topic, channel.topic.lstrip("/")} & set(topics):
+        by_topic: dict[str, tuple[Any, Any]] = {}
+        for channel in channels.values():
+            if topics and not _names(channel) & set(topics):
                 continue
-            kind = message_class(type_name)
-            if kind is None:
-                self.get_logger().warning(f"{channel.topic}: left out, {type_name} is not installed")
-                continue
-            if channel.topic not in by_topic:
-                qos = recorded_qos(channel.metadata.get("offered_qos_profiles", ""))
-                by_topic[channel.topic] = self.create_publisher(kind, channel.topic, qos)
-            found[channel.id] = by_topic[channel.topic]
+            try:
+                kind = installed_type(channel, self._playback.schema(channel))
+                if channel.topic not in by_topic:
+                    qos = recorded_qos(channel.metadata.get("offered_qos_profiles", ""))
+                    by_topic[channel.topic] = kind, self.create_publisher(kind, channel.topic, qos)
+            except NameValidationException:
+                self.get_logger().warning(f"{channel.topic}: left out, ROS does not allow this name")
+            except SbsError as error:
+                self.get_logger().warning(f"{channel.topic}: left out, {error}")
+            else:
+                first, found[channel.id] = by_topic[channel.topic]
+                if kind is not first:
+                    self.get_logger().warning(f"{channel.topic}: partly left out, it was recorded with two types")
+                    del found[channel.id]
         return found
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
@@ -114,13 +131,17 @@ class Replay(Component):
         return response
 
     def _play(self) -> None:
-        self._await_listeners()
         try:
+            self._await_listeners()
             for _ in itertools.count() if self._loop else range(1):
-                if not self._play_once():
+                begun = time.monotonic()
+                if not self._play_once() or self._wait_until(begun + SHORTEST_PASS) is None:
                     return
         except SbsError as error:
-            self.get_logger().error(str(error))
+            self.failure = str(error)
+        except Exception as error:  # of ours
+            self.get_logger().error(f"internal error: {traceback.format_exc()}")
+            self.failure = f"internal error, see above: {error!r}"
         finally:
             self._ended.set()
 
@@ -134,29 +155,22 @@ class Replay(Component):
                     return
 
     def _play_once(self) -> bool:
-        """Publish the log from start to end; false if that was broken off or there was nothing."""
+        """Publish the log from start to end; false if that was broken off."""
         anchor: float | None = None
         begin = 0
-        for message in self._wanted():
+        for log_time, channel, data in self._playback.messages(self._start, self._end):
+            if channel not in self._outputs:
+                continue
             if anchor is None:
-                anchor, begin = time.monotonic(), message.log_time
-            held = self._wait_until(anchor + (message.log_time - begin) * 1e-9 / self._rate)
+                anchor, begin = time.monotonic(), log_time
+            held = self._wait_until(anchor + (log_time - begin) * 1e-9 / self._rate)
             if held is None:
                 return False
             anchor += held
-            self._outputs[message.channel_id].publish(message.data)
-        return anchor is not None
-
-    def _wanted(self) -> Iterator[Message]:
-        """Messages of the wanted topics and time, in the order of their time."""
-        first: int | None = None
-        for message in _messages(self._path):
-            first = message.log_time if first is None else first
-            since = (message.log_time - first) * 1e-9
-            if since > self._end:
-                return
-            if since >= self._start and message.channel_id in self._outputs:
-                yield message
+            self._outputs[channel].publish(data)
+        if anchor is None:
+            raise RecordingError(f"{self._playback.path}: there is nothing to play in this part or on these topics")
+        return True
 
     def _wait_until(self, due: float) -> float | None:
         """Sleep until a wall time; how long a pause held it up [s], None at the end."""
@@ -181,51 +195,42 @@ class Replay(Component):
         self._thread.join()
 
 
-def _channels(path: Path) -> list[tuple[Channel, str]]:
-    """Channels of a log with their types.
+def _names(channel: Channel) -> set[str]:
+    """What a topic may be called on the command line."""
+    return {channel.topic, channel.topic.lstrip("/")}
+
+
+def installed_type(channel: Channel, schema: Schema | None) -> Any:
+    """Class of a channel's messages.
 
     Raises
     ------
-    RecordingError
-        The file cannot be read.
+    SbsError
+        They are no ROS 2 messages, or their type is not installed or not the one that was recorded.
     """
-    found: dict[int, tuple[Channel, str]] = {}
-    with _reading(path) as reader:
-        summary = reader.get_summary()
-        if summary is not None and summary.channels:
-            return [(channel, summary.schemas[channel.schema_id].name) for channel in summary.channels.values()]
-        for schema, channel, _ in reader.iter_messages():
-            found[channel.id] = (channel, schema.name if schema else "")
-    return list(found.values())
-
-
-def _messages(path: Path) -> Iterator[Message]:
-    """Messages in the order of their time; see `_channels`."""
-    with _reading(path) as reader:
-        for _, _, message in reader.iter_messages(log_time_order=True):
-            yield message
-
-
-@contextlib.contextmanager
-def _reading(path: Path) -> Iterator[Any]:
-    """A reader that checks all checksums; what goes wrong with the file is told in one line."""
+    if schema is None or channel.message_encoding != "cdr":
+        raise SbsError(f"its messages are no ROS 2 messages but {channel.message_encoding or 'of no known kind'}")
+    package, _, name = schema.name.partition("/")
     try:
-        with path.open("rb") as stream:
-            yield make_reader(stream, validate_crcs=True)
-    except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror or error}") from None
-    except (McapError, struct.error, ValueError, EOFError) as error:
-        hint = f"`replay --recover {path}` saves what is whole"
-        raise RecordingError(f"{path} is damaged ({' '.join(str(error).split())}): {hint}") from None
+        kind = getattr(importlib.import_module(f"{package}.msg"), name.rpartition("/")[2])
+    except (ImportError, AttributeError, ValueError, TypeError):  # the latter for names that no module can have
+        kind = None
+    if not hasattr(kind, "get_fields_and_field_types"):
+        raise SbsError(f"{schema.name} is not installed")
+    if schema.encoding == "ros2msg" and schema.data:
+        recorded = _fields(schema.name, schema.data.decode(errors="replace"))
+        installed = _fields(schema.name, message_definition(schema.name, definition_file))
+        if any(recorded.get(name) != fields for name, fields in installed.items()):
+            raise SbsError(f"{schema.name} is installed with other fields than were recorded")
+    return kind
 
 
-def message_class(type_name: str) -> Any:
-    """Class of a message type, None if it is not installed."""
-    package, _, name = type_name.partition("/")
-    try:
-        return getattr(importlib.import_module(f"{package}.msg"), name.rpartition("/")[2])
-    except (ImportError, AttributeError):
-        return None
+def _fields(type_name: str, text: str) -> dict[str, list[tuple[str, str, int | None]]]:
+    """What decides how a message is written, by type; some writers name the byte that an empty message has."""
+    return {
+        kind: [(field.name, field.type, field.count) for field in fields if field.name != EMPTY]
+        for kind, fields in parse(type_name, text).items()
+    }
 
 
 def recorded_qos(profiles: str) -> QoSProfile:
@@ -252,7 +257,7 @@ def _one_of(policy: Any, value: Any, first: tuple[str, int]) -> Any:
 # --- other aircraft, same commands ------------------------------------------------------------------------------
 
 
-def fly_with(flight: Flight, changes: Sequence[str], output: Path) -> tuple[Path, int]:
+def fly_with(flight: Flight, changes: Sequence[str], output: Path, stop: threading.Event) -> tuple[Path, int]:
     """Fly the events of a flight with a changed aircraft into a new log.
 
     Parameters
@@ -261,6 +266,8 @@ def fly_with(flight: Flight, changes: Sequence[str], output: Path) -> tuple[Path
     changes : sequence of str
         "PATH=VALUE" each, see `Aircraft.with_value`.
     output : Path
+    stop : threading.Event
+        Ends the flight with a KeyboardInterrupt.
 
     Returns
     -------
@@ -282,9 +289,14 @@ def fly_with(flight: Flight, changes: Sequence[str], output: Path) -> tuple[Path
     simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **flight.options)
     log = Recorder(str(output), simulation, {"with": list(changes)})
     try:
-        return log.path, _write_flight(flight, aircraft, simulation.step_size, log)
-    finally:
-        log.close()
+        steps = _write_flight(flight, aircraft, simulation.step_size, log, stop)
+    except BaseException:  # an interruption too: half a flight looks like a whole one
+        log.discard()
+        raise
+    log.close()
+    if log.fault:
+        raise RecordingError(log.fault)
+    return log.path, steps
 
 
 def changed(aircraft: Aircraft, change: str) -> Aircraft:
@@ -305,7 +317,7 @@ def changed(aircraft: Aircraft, change: str) -> Aircraft:
     return aircraft.with_value(path, value)
 
 
-def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Recorder) -> int:
+def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Recorder, stop: threading.Event) -> int:
     """Fly and record; the number of the last step."""
     made = StateMessages(aircraft)
     kinds = {
@@ -326,6 +338,8 @@ def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Rec
     last = 0
     try:
         for snapshot in refly(aircraft, flight.events, int(flight.steps[-1]), **flight.options):
+            if stop.is_set():
+                raise KeyboardInterrupt
             made.fill(snapshot)
             keep("/clock", Clock(clock=to_time(snapshot.time)), snapshot.time)
             for topic, message in (("/state", made.state), ("/rotors", made.rotors), ("/inflow", made.inflow)):
@@ -343,6 +357,8 @@ def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Rec
 def main(args: list[str] | None = None) -> None:
     """Do with a log what the command line asks for."""
     options = _parse(rclpy.utilities.remove_ros_args(args)[1:])
+    if options.recover:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # what is half written is to be taken away
     try:
         if options.recover:
             sys.exit(_recover(options.file, options.output))
@@ -351,6 +367,8 @@ def main(args: list[str] | None = None) -> None:
         if options.changes:
             sys.exit(_fly_with(options))
         sys.exit(_replay(options))
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
     except SbsError as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         sys.exit(1)
@@ -363,7 +381,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--start", type=float, default=0.0, help="where to begin [s after the first message]")
     parser.add_argument("--end", type=float, default=float("inf"), help="where to end [s after the first message]")
     parser.add_argument("--loop", action="store_true", help="begin again at the end")
-    parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, all if not given")
+    parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, all if not given; after FILE")
     parser.add_argument(
         "--delay", type=float, default=1.0, help="longest wait before the first message until every topic is heard [s]"
     )
@@ -374,13 +392,19 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
         "--with", dest="changes", action="append", metavar="KEY=VALUE", help="fly the commands with a changed aircraft"
     )
     parser.add_argument(
-        "--output", default="", help="log to write, a file or a folder (default of --recover: FILE.recovered.mcap)"
+        "--output",
+        default="",
+        help="log to write, a file or a folder (default: FILE.recovered.mcap, or one named after the time)",
     )
     options = parser.parse_args(arguments)
     if not 1.0 / LARGEST_RATE <= options.rate <= LARGEST_RATE:
         parser.error(f"--rate {options.rate}: allowed are {1 / LARGEST_RATE:g} to {LARGEST_RATE:g}")
     if not 0.0 <= options.delay <= LONGEST_DELAY:
         parser.error(f"--delay {options.delay}: allowed are 0 to {LONGEST_DELAY:g}")
+    if not 0.0 <= options.end <= float("inf"):
+        parser.error(f"--end {options.end}: allowed is 0 or more")
+    if options.output and not (options.recover or options.changes):
+        parser.error("--output: allowed with --recover and --with")
     if not 0.0 <= options.start <= options.end:
         parser.error(f"--start {options.start}: allowed are 0 to --end")
     return options
@@ -388,24 +412,19 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 def _replay(options: argparse.Namespace) -> int:
     """Play until the end of the log or an interruption."""
-    _refuse_damaged(options.file)
     ended = threading.Event()
-    part = (options.start, options.end)
-    return run(
-        lambda: [Replay(options.file, options.rate, *part, options.loop, options.topics, options.delay, ended)],
-        sys.argv[:1],
-        ended,
-    )
+    players: list[Replay] = []
+    with Playback(options.file) as playback:
 
+        def make() -> list[Component]:
+            part = (options.start, options.end)
+            players.append(Replay(playback, options.rate, *part, options.loop, options.topics, options.delay, ended))
+            return list(players)
 
-def _refuse_damaged(path: Path) -> None:
-    """Raise RecordingError for a log that is not whole; one of another writer, without checksums, is taken as it is."""
-    try:
-        log = read(path)
-    except RecordingError:
-        return
-    if not log.complete:
-        raise RecordingError(f"{path} is not whole ({log.reasons[0]}): `replay --recover {path}` saves what is")
+        code = run(make, sys.argv[:1], ended)
+    if players and players[0].failure:
+        raise RecordingError(players[0].failure)
+    return code
 
 
 def _recover(path: Path, output: str) -> int:
@@ -423,9 +442,17 @@ def _recover(path: Path, output: str) -> int:
     return 3
 
 
+def _read(path: Path) -> Log:
+    """A log; that something is missing in it is told."""
+    log = read(path)
+    if not log.complete:
+        print(f"{path} is not whole: {log.reasons[0]}", file=sys.stderr)
+    return log
+
+
 def _verify(path: Path) -> int:
     """0 if every state came again as it should."""
-    flight = flight_of(read(path))
+    flight = flight_of(_read(path))
     found = verify(flight)
     for name, (recorded, here) in found.other_versions.items():
         print(f"other {name}: {recorded or 'unknown'} recorded, {here} here")
@@ -447,8 +474,10 @@ def _verify(path: Path) -> int:
 
 
 def _fly_with(options: argparse.Namespace) -> int:
-    flight = flight_of(read(options.file))
-    path, steps = fly_with(flight, options.changes, Path(options.output) if options.output else Path())
+    flight = flight_of(_read(options.file))
+    stop = threading.Event()  # an exception would be lost in the callbacks of the compiler
+    signal.signal(signal.SIGINT, lambda *_: stop.set())
+    path, steps = fly_with(flight, options.changes, Path(options.output), stop)
     print(f"{path}: {steps} of {flight.steps[-1]} steps")
     return 0
 

@@ -173,12 +173,12 @@ class Simulator(Component):
         """End the flight; whoever waits for it is told so."""
         self.loop.stop()
 
-    def destroy_node(self) -> None:
-        """End the publishing, then the node."""
+    def finish(self) -> None:
+        """End the publishing, then the log."""
         self._outputs.join()
         if self.log is not None:
             self.log.close()
-        super().destroy_node()
+            self._outputs.say_log_fault()
 
 
 def checked_components(names: list[str]) -> tuple[str, ...]:

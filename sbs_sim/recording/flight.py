@@ -162,6 +162,8 @@ def flight_of(log: Log) -> Flight:
         aircraft = _aircraft(log.attachments, Path(folder.name))
         if aircraft.parameter_hash != simulation["parameter_hash"]:
             raise RecordingError("the aircraft in the log is not the one that was flown: its hash differs")
+        if not len(log["events"].time) or not len(log["state"].time):
+            raise RecordingError("the log holds no flight of sbs_sim: it has no events or no states")
         steps, states = _states(log, aircraft, float(simulation["step_size"]))
         options = {name: _option(simulation[name], kind) for name, kind in OPTIONS.items()}
         return Flight(aircraft, options, _events(log, aircraft), steps, states, dict(recorded), folder)

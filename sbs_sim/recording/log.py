@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording.cdr import Columns, decode
 from sbs_sim.recording.definitions import Definitions, Units, parse, short_name
-from sbs_sim.recording.mcap_log import START
+from sbs_sim.recording.mcap_file import START
 from sbs_sim.recording.scan import Content, Scan, Source, scan
 
 
@@ -153,7 +153,8 @@ class Log(Mapping[str, Topic]):
 def read(path: str | Path) -> Log:
     """Read a recording, as much of it as is whole.
 
-    Every byte that is used is covered by a checksum that is right. What is missing is told by `complete` and `reasons`.
+    Every byte that is used is covered by a checksum that is right, but in files of other writers that made none, which
+    `reasons` tells. What is missing is told by `complete` and `reasons`.
 
     Parameters
     ----------
@@ -183,12 +184,27 @@ def read(path: str | Path) -> Log:
         found.reasons.append(f"{len(times[number])} messages of a topic whose definition is lost")
         found.complete = False
     topics: dict[str, Topic] = {}
-    for number, channel in sorted(found.channels.items()):
-        if channel.topic in topics:
-            raise RecordingError(f"cannot read {path}: topic {channel.topic} is recorded twice")
-        schema = found.schemas[channel.schema_id]
-        topics[channel.topic] = Topic(channel.topic, schema, times.get(number, []), messages.get(number, []))
+    for topic, schema, numbers in _by_topic(source, found):
+        rows = [row for number in numbers for row in zip(times.get(number, ()), messages.get(number, ()), strict=True)]
+        if len(numbers) > 1:
+            rows.sort(key=lambda row: row[0])
+        topics[topic] = Topic(topic, schema, [row[0] for row in rows], [row[1] for row in rows])
     return Log(source.path, found, topics)
+
+
+def _by_topic(source: Source, found: Scan) -> list[tuple[str, Schema, list[int]]]:
+    """Topics with their type and channels; other writers have a channel for each publisher, and topics without type."""
+    topics: dict[str, tuple[str, Schema, list[int]]] = {}
+    for number, channel in sorted(found.channels.items()):
+        if not channel.schema_id:
+            found.reasons.append(f"topic {channel.topic} has no type and is left out")
+            continue
+        schema = found.schemas[channel.schema_id]
+        _, first, numbers = topics.setdefault(channel.topic, (channel.topic, schema, []))
+        if (first.name, first.data) != (schema.name, schema.data):
+            raise RecordingError(f"cannot read {source.path}: topic {channel.topic} is recorded with two types")
+        numbers.append(number)
+    return list(topics.values())
 
 
 def require_something(source: Source, found: Scan) -> None:

@@ -36,6 +36,7 @@ from mcap.records import (
     SummaryOffset,
 )
 from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 
 from sbs_sim.errors import RecordingError
 
@@ -49,6 +50,8 @@ DEFINITIONS_TWICE = 2  # new schemas and channels come with the next two chunks,
 DEFINITIONS_PERIOD = 8  # and all of them with every so many: no single damage can take them all
 CHECKSUM = "crc32"  # key of a metadata record's checksum, which the format has not
 ROSBAG2 = "rosbag2"  # metadata record of that name is rosbag2's
+START = "recording"  # metadata record that every file of ours begins with,
+RECOVERY = "recovery"  # and the one that every recovered file ends with
 BAG_VERSION = 9  # of rosbag2's metadata, Jazzy's
 
 Message = tuple[int, int, int, int, bytes]  # channel, sequence, log time [ns], publish time [ns], data
@@ -317,12 +320,13 @@ def bag_metadata(
                 "name": channel.topic,
                 "type": schemas[channel.schema_id].name,
                 "serialization_format": channel.message_encoding,
-                "offered_qos_profiles": yaml.load(channel.metadata.get("offered_qos_profiles", "")) or [],
+                "offered_qos_profiles": _profiles(yaml, channel.metadata.get("offered_qos_profiles", "")),
                 "type_description_hash": channel.metadata.get("topic_type_hash", ""),
             },
             "message_count": statistics.channel_message_counts.get(channel.id, 0),
         }
         for channel in channels.values()
+        if channel.schema_id in schemas  # rosbag2 knows no topics without a type
     ]
     text = io.StringIO()
     yaml.dump(
@@ -341,3 +345,11 @@ def bag_metadata(
         text,
     )
     return text.getvalue()
+
+
+def _profiles(yaml: Any, text: str) -> Any:
+    """Quality of service profiles of a topic; none where another writer has put something else there."""
+    try:
+        return yaml.load(text) or []
+    except YAMLError:
+        return []

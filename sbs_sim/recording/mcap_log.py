@@ -17,16 +17,14 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from sbs_sim.errors import RecordingError
-from sbs_sim.recording.mcap_file import CHECKSUM, MAGIC, ROSBAG2, FileBuilder, Message, NewFile
+from sbs_sim.recording.mcap_file import CHECKSUM, MAGIC, RECOVERY, ROSBAG2, START, FileBuilder, Message, NewFile
 
 FLUSH_PERIOD = 0.2  # s of wall time between chunks
 CHUNK_SIZE = 256 * 1024  # bytes of messages at which a chunk is closed before that
 QUEUE_LENGTH = 10_000  # messages that wait for the disk: 15 s of flight
 LARGEST_ATTACHMENT = 1 << 27  # bytes
 LATEST_TIME = 2**63  # ns; MCAP could hold twice that, most readers cannot
-START = "recording"  # metadata records of our own
-END = "recording_end"
-RECOVERY = "recovery"
+END = "recording_end"  # metadata records of our own
 RESERVED = (START, END, RECOVERY, ROSBAG2)
 
 
@@ -162,7 +160,7 @@ class LogWriter:
             self._sequence[number] = 0
         return number
 
-    def write(self, channel: int, log_time_ns: int, data: bytes, wait: bool = False) -> bool:
+    def write(self, channel: int, log_time_ns: int, data: bytes, wait: bool = False, essential: bool = False) -> bool:
         """Take a message; false if it is dropped. Costs about a microsecond and never waits, unless told to.
 
         Parameters
@@ -175,6 +173,8 @@ class LogWriter:
             The message in CDR.
         wait : bool
             Wait for room in the queue rather than drop the message.
+        essential : bool
+            Use the room that is kept for such messages, as much again as the queue has.
 
         Raises
         ------
@@ -183,14 +183,15 @@ class LogWriter:
         """
         if not 0 <= log_time_ns < LATEST_TIME:
             raise RecordingError(f"log time {log_time_ns} ns: allowed are 0 to 2^63 - 1")
+        limit = self._queue_length * (2 if essential else 1)
         with self._lock:
-            if wait and len(self._queue) >= self._queue_length:
-                self._room.wait_for(lambda: self._closing or len(self._queue) < self._queue_length)
+            if wait and len(self._queue) >= limit:
+                self._room.wait_for(lambda: self._closing or len(self._queue) < limit)
             try:
                 sequence = self._sequence[channel] = self._sequence[channel] + 1 & 0xFFFFFFFF
             except KeyError:
                 raise RecordingError(f"channel {channel}: allowed are those that add_channel gave") from None
-            if self._closing or len(self._queue) >= self._queue_length:
+            if self._closing or len(self._queue) >= limit:
                 self.dropped += 1
                 return False
             self._queue.append((channel, sequence, log_time_ns, log_time_ns, data))

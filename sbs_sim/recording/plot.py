@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from sbs_sim.errors import RecordingError
 from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
+from sbs_sim.plot_style import COLOURS, DASHES
 from sbs_sim.recording.log import Log, Topic
 
 Array = NDArray[np.float64]
 Curves = Mapping[str, tuple[Array, Array]]  # name to time and values
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
-DASHES = ("-", "--", "-.", ":")
 SUFFIXES = (".png", ".svg", ".html")
 WIDTH, PANEL_HEIGHT = 8.0, 1.7  # in
 STILL = 1e-6  # what an axis covers at least

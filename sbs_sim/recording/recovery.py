@@ -6,8 +6,7 @@ from pathlib import Path
 
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording.log import require_something
-from sbs_sim.recording.mcap_file import MESSAGE_HEAD, FileBuilder, Message, NewFile
-from sbs_sim.recording.mcap_log import RECOVERY, START
+from sbs_sim.recording.mcap_file import MESSAGE_HEAD, RECOVERY, START, FileBuilder, Message, NewFile
 from sbs_sim.recording.scan import Content, Scan, Source, scan
 
 

@@ -3,6 +3,9 @@
 The file is gone through from its start to its end. Taken are chunks, attachments and metadata whose checksum is right;
 the definitions of types and topics come from the chunks and from the summary, which has one too. Where a record makes
 no sense the search goes on at the next place known from the summary or the next bytes that look like a chunk.
+
+The format leaves checksums to the writer, and others leave some or all of them out. What such a file has none for is
+taken as it is, and said to be so; a file of ours, or one in which any chunk has a checksum, is never trusted like that.
 """
 
 import bisect
@@ -36,7 +39,18 @@ from mcap.records import (
 from mcap.stream_reader import get_chunk_data_stream
 
 from sbs_sim.errors import RecordingError
-from sbs_sim.recording.mcap_file import CHECKSUM, MAGIC, MESSAGE_HEAD, ROSBAG2, metadata_checksum, reason, serialize
+from sbs_sim.recording.mcap_file import (
+    CHECKSUM,
+    MAGIC,
+    MESSAGE_HEAD,
+    MESSAGE_OVERHEAD,
+    RECOVERY,
+    ROSBAG2,
+    START,
+    metadata_checksum,
+    reason,
+    serialize,
+)
 
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length
 CHUNK_HEAD = struct.Struct(
@@ -58,6 +72,8 @@ OTHER_RECORDS = frozenset(
         Opcode.METADATA,
     )
 )
+# Records that stand in chunks, or in a file without chunks between the others.
+CONTENT_RECORDS = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
 BLOCK = 1 << 20
 MOST_REASONS = 100  # a file of another kind can be wrong at every message
 # What the reading of nonsense can end with: short data, wrong text, a decompressor's complaint, absurd sizes.
@@ -103,6 +119,22 @@ class Content:
         """What identifies the chunk."""
         times = [message[2] for message in self.messages] or [0]
         return len(self.data), min(times), max(times)
+
+
+@dataclass(frozen=True)
+class Trust:
+    """What of a file is taken without a checksum, because its writer made none.
+
+    Attributes
+    ----------
+    foreign : bool
+        Another program's file: metadata, attachments and summary need no checksum, and there may be no summary.
+    content : bool
+        No chunk has a checksum: they need none, and messages may stand outside of chunks.
+    """
+
+    foreign: bool = False
+    content: bool = False
 
 
 @dataclass
@@ -234,16 +266,22 @@ class Source:
 
 
 def scan(source: Source, take: Callable[[Content], None]) -> Scan:
-    """Go through a file and hand out the content of every chunk that is whole, in the order of the file."""
-    summary = read_summary(source)
+    """Go through a file and hand out the content of every chunk that is whole, in the order of the file.
+
+    Of messages outside of chunks some that follow one another are handed out like a chunk.
+    """
+    trust, summary = open_recording(source)
     found = Scan()
+    walk = _Walk(source, summary, trust, found, take)
     try:
-        data_end = _Walk(source, summary, found, take).go()
+        data_end = walk.go()
     except DamageError as damage:  # it was longer when this began
         raise RecordingError(f"cannot read {source.path}: {damage}") from None
     if summary is not None:
         found.schemas.update(summary.schemas)
         found.channels.update(summary.channels)
+    if summary is not None and not found.lost_bytes and summary.messages not in (-1, found.messages):
+        found.note(f"{summary.messages} messages by the summary, {found.messages} in the file")
     if data_end and not found.lost_bytes and not found.reasons:
         found.complete = True  # the checksum of everything is right
     elif summary is not None:
@@ -253,10 +291,54 @@ def scan(source: Source, take: Callable[[Content], None]) -> Scan:
     if summary is None:
         closed = data_end or (source.size >= len(MAGIC) and source.at(source.size - len(MAGIC), len(MAGIC)) == MAGIC)
         found.reasons.append("the summary is damaged" if closed else "the recording was not closed: it has no end")
+    if walk.unchecked:
+        found.reasons.append(f"no checksums, so that damage cannot be found: {', '.join(sorted(walk.unchecked))}")
     found.channels = {
-        number: channel for number, channel in found.channels.items() if channel.schema_id in found.schemas
+        number: channel
+        for number, channel in found.channels.items()
+        if channel.schema_id in found.schemas or not channel.schema_id
     }
     return found
+
+
+def open_recording(source: Source) -> tuple[Trust, Summary | None]:
+    """What of a file needs no checksum, and its summary, if it has one that can be used."""
+    summary = read_summary(source)
+    trust = trust_in(source, summary)
+    if summary is None and trust.foreign:
+        summary = read_summary(source, checked=False)
+    return trust, summary
+
+
+def trust_in(source: Source, summary: Summary | None) -> Trust:
+    """Whether a file is another program's, and whether it has checksums at all, from the heads of its records."""
+    if summary is not None and {START, RECOVERY} & set(summary.metadata.values()):
+        return Trust()
+    foreign, content = summary is not None, False
+    offset = len(MAGIC)
+    try:
+        while offset < source.size:
+            opcode, length = RECORD_HEAD.unpack(source.at(offset, RECORD_HEAD.size))
+            if opcode == Opcode.METADATA and _is_ours(source.at(offset + RECORD_HEAD.size, length)):
+                return Trust()
+            if opcode == Opcode.CHUNK and CHUNK_HEAD.unpack(source.at(offset, CHUNK_HEAD.size))[5]:
+                return Trust(foreign=True)
+            foreign = foreign or opcode == Opcode.DATA_END
+            content = content or opcode in (Opcode.CHUNK, Opcode.MESSAGE)
+            if opcode == Opcode.DATA_END or opcode not in OTHER_RECORDS | CONTENT_RECORDS | {Opcode.CHUNK}:
+                break
+            offset += RECORD_HEAD.size + length
+    except DamageError:
+        pass  # what was seen before it counts
+    return Trust(foreign or content, content)
+
+
+def _is_ours(data: bytes) -> bool:
+    """True for a metadata record with a right checksum of the kind that the format does not have."""
+    try:
+        return whole_metadata(data).name != ROSBAG2
+    except DamageError:
+        return False
 
 
 def _nothing_missing(summary: Summary, found: Scan) -> bool:
@@ -272,8 +354,11 @@ def _nothing_missing(summary: Summary, found: Scan) -> bool:
 class _Walk:
     """One way through a file."""
 
-    def __init__(self, source: Source, summary: Summary | None, found: Scan, take: Callable[[Content], None]) -> None:
-        self._source, self._summary, self._found, self._take = source, summary, found, take
+    def __init__(
+        self, source: Source, summary: Summary | None, trust: Trust, found: Scan, take: Callable[[Content], None]
+    ) -> None:
+        self._source, self._summary, self._trust, self._found, self._take = source, summary, trust, found, take
+        self.unchecked: set[str] = set()  # what was taken without a checksum
         self._places = summary.places() if summary else []
         self._sure = len(MAGIC)  # end of the last record with a right checksum
         self._seen: set[int] = set()  # where something was read, right or wrong
@@ -309,33 +394,48 @@ class _Walk:
 
     def _checksum_is_right(self, offset: int) -> bool:
         (crc,) = struct.unpack("<I", self._source.at(offset + RECORD_HEAD.size, 4))
+        if not crc and self._trust.foreign:
+            return True  # none was made, which is allowed
         right = crc == self._source.checksum(offset)
+        if right:
+            self.unchecked.clear()  # it covers them all
         if crc and not right and not self._found.reasons:
             self._found.reasons.append("the checksum of the data is wrong, those of their parts are right")
         return right
 
     def _chunk(self, offset: int) -> int:
         """Take a chunk; where the next record begins."""
-        content, following, note = self._content(offset)
+        content, following, note = self._content(offset, self._trust.content)
         if note:
             self._found.note(f"byte {offset}: {note}")
+        self._keep(offset, content, following)
+        return following
+
+    def _keep(self, offset: int, content: Content, following: int) -> None:
+        """Take a content that ends at a place."""
+        if self._trust.content:
+            self.unchecked.add("messages")
         self._found.chunks[offset] = content.extent()
         self._found.messages += len(content.messages)
         self._found.schemas.update(content.schemas)
         self._found.channels.update(content.channels)
         self._take(content)
         self._sure = following
-        return following
 
-    def _content(self, offset: int) -> tuple[Content, int, str]:
+    def _content(self, offset: int, unchecked: bool = False) -> tuple[Content, int, str]:
         """What `chunk_at` gives, if it is what the summary says of this place."""
-        content, following, note = chunk_at(self._source, offset, self._end)
-        if self._summary is not None and self._summary.chunks.get(offset) != content.extent():
+        content, following, note = chunk_at(self._source, offset, self._end, unchecked)
+        known = None if self._summary is None else self._summary.chunks
+        if known is not None and (known or not self._trust.foreign) and known.get(offset) != content.extent():
             raise DamageError("a chunk that the summary does not know")
         return content, following, note
 
     def _other(self, offset: int, opcode: int, length: int) -> int:
         """Take another record; where the next one begins."""
+        if self._trust.content and opcode in CONTENT_RECORDS:
+            content, following = run_at(self._source, offset, self._end)
+            self._keep(offset, content, following)
+            return following
         if opcode not in OTHER_RECORDS:
             raise DamageError("a damaged record, or a message without a checksum")
         following = offset + RECORD_HEAD.size + length
@@ -343,12 +443,16 @@ class _Walk:
             raise DamageError("the file ends in the middle of a record")
         data = self._source.at(offset + RECORD_HEAD.size, length)
         if opcode == Opcode.ATTACHMENT:
-            attachment = whole_attachment(data)
+            attachment = whole_attachment(data, self._trust.foreign)
+            if not struct.unpack("<I", data[-4:])[0]:
+                self.unchecked.add("attachments")
             self._found.attachments[attachment.name] = attachment
             self._sure = following
         elif opcode == Opcode.METADATA:
-            metadata = whole_metadata(data)
+            metadata = whole_metadata(data, self._trust.foreign)
             if metadata.name != ROSBAG2:
+                if not _is_ours(data):
+                    self.unchecked.add("metadata")
                 self._found.metadata[metadata.name] = metadata.metadata
                 self._sure = following
         elif opcode == Opcode.MESSAGE_INDEX:
@@ -412,10 +516,30 @@ class _Walk:
         return True
 
 
-def chunk_at(source: Source, offset: int, end: int) -> tuple[Content, int, str]:
+def run_at(source: Source, offset: int, end: int) -> tuple[Content, int]:
+    """Messages and definitions outside of chunks that follow one another, a BLOCK of them or somewhat more.
+
+    Raises
+    ------
+    DamageError
+        They make no sense.
+    """
+    following = offset
+    while following + RECORD_HEAD.size <= end and following - offset < BLOCK:
+        opcode, length = RECORD_HEAD.unpack(source.at(following, RECORD_HEAD.size))
+        if opcode not in CONTENT_RECORDS or length > LARGEST or following + RECORD_HEAD.size + length > end:
+            break
+        following += RECORD_HEAD.size + length
+    if following == offset:
+        raise DamageError("the file ends in the middle of a record")
+    return chunk_content(source.at(offset, following - offset)), following
+
+
+def chunk_at(source: Source, offset: int, end: int, unchecked: bool = False) -> tuple[Content, int, str]:
     """Content of the chunk at a place, where the next record begins, and what is wrong with it all the same.
 
     Of the chunk's fields only the checksum is believed; its length is there twice, and the right one is tried out.
+    `unchecked` takes a chunk that has none as well, if its fields agree with its content.
 
     Raises
     ------
@@ -433,18 +557,20 @@ def chunk_at(source: Source, offset: int, end: int) -> tuple[Content, int, str]:
     for data_length in dict.fromkeys((inner, outer)):
         if not 0 <= data_length <= min(end - place, LARGEST):
             continue
-        data = _decompress(source.at(place, data_length), compression, crc)
+        data = _decompress(source.at(place, data_length), compression, crc, unchecked)
         if data is not None:
             content = chunk_content(data)
             right = (opcode, inner, (size, start, stop)) == (Opcode.CHUNK, outer, content.extent())
+            if not crc and not right:
+                break
             return content, place + data_length, "" if right else "the head of a chunk is damaged, its content is whole"
     if place + inner > end and place + outer > end:
         raise DamageError("the file ends in the middle of a chunk")
     raise DamageError("a chunk is damaged: its checksum is wrong" if crc else "a chunk has no checksum to trust")
 
 
-def _decompress(data: bytes, compression: bytes, crc: int) -> bytes | None:
-    """Content of a chunk if its checksum is right; a chunk without a checksum counts as damaged.
+def _decompress(data: bytes, compression: bytes, crc: int, unchecked: bool) -> bytes | None:
+    """Content of a chunk if its checksum is right; a chunk without a checksum counts as damaged unless told otherwise.
 
     So does one without content: zeros look like one, the checksum of nothing being zero.
     """
@@ -461,7 +587,7 @@ def _decompress(data: bytes, compression: bytes, crc: int) -> bytes | None:
         content = stream.read(length)
     except NONSENSE:
         return None
-    return content if content and zlib.crc32(content) == crc else None
+    return content if content and (zlib.crc32(content) == crc or (unchecked and not crc)) else None
 
 
 def chunk_content(data: bytes) -> Content:
@@ -482,6 +608,8 @@ def chunk_content(data: bytes) -> Content:
             if following > end:
                 raise ValueError
             if opcode == MESSAGE:
+                if length < MESSAGE_OVERHEAD:
+                    raise ValueError
                 _, _, channel, sequence, log_time, publish_time = unpack(data, offset)
                 add((channel, sequence, log_time, publish_time, offset + MESSAGE_HEAD.size, following))
             elif opcode == Opcode.SCHEMA:
@@ -496,18 +624,24 @@ def chunk_content(data: bytes) -> Content:
     return content
 
 
-def whole_attachment(data: bytes) -> Attachment:
-    """Attachment of a record, if its checksum is right."""
-    if len(data) < 4 or struct.unpack("<I", data[-4:])[0] != zlib.crc32(data[:-4]):
+def whole_attachment(data: bytes, unchecked: bool = False) -> Attachment:
+    """Attachment of a record, if its checksum is right, or missing where that is allowed."""
+    crc = struct.unpack("<I", data[-4:])[0] if len(data) >= 4 else -1
+    if crc != zlib.crc32(data[:-4]) and (crc or not unchecked):
         raise DamageError("an attachment is damaged: its checksum is wrong")
-    attachment: Attachment = _whole(Attachment, data)
+    attachment: Attachment = _whole(Attachment, data if crc == zlib.crc32(data[:-4]) else _signed(data))
     return attachment
 
 
-def whole_metadata(data: bytes) -> Metadata:
-    """Metadata of a record without their checksum, if it is right; rosbag2's has none."""
+def _signed(data: bytes) -> bytes:
+    """An attachment's record with a checksum."""
+    return data[:-4] + struct.pack("<I", zlib.crc32(data[:-4]))
+
+
+def whole_metadata(data: bytes, unchecked: bool = False) -> Metadata:
+    """Metadata of a record without their checksum, if it is right or may be missing, as in rosbag2's."""
     metadata: Metadata = _whole(Metadata, data)
-    if metadata.name != ROSBAG2:
+    if metadata.name != ROSBAG2 and not (unchecked and CHECKSUM not in metadata.metadata and metadata.name != START):
         crc = metadata.metadata.pop(CHECKSUM, "")
         if crc != metadata_checksum(metadata.name, metadata.metadata):
             raise DamageError(f"the metadata {metadata.name!r} are damaged: their checksum is wrong")
@@ -529,18 +663,23 @@ def _read(kind: Any, data: bytes) -> Any:
     return kind.read(ReadDataStream(io.BytesIO(data)))
 
 
-def read_summary(source: Source) -> Summary | None:
-    """The summary, if there is one with a right checksum."""
+def read_summary(source: Source, checked: bool = True) -> Summary | None:
+    """The summary, if there is one with a right checksum.
+
+    Where it need not be `checked` it may lack the checksum, or be missing altogether in a file that has its end.
+    """
     try:
         end = source.size - FOOTER_SIZE - len(MAGIC)
         data = source.at(end, FOOTER_SIZE) if end > 0 else b""
         if data[: RECORD_HEAD.size] != RECORD_HEAD.pack(Opcode.FOOTER, 20):
             return None
         footer = _read(Footer, data[RECORD_HEAD.size :])
+        if not footer.summary_start and not checked:
+            return Summary(end)
         if not len(MAGIC) <= footer.summary_start <= end:
             return None
         records = source.at(footer.summary_start, end - footer.summary_start)
-        if zlib.crc32(records + data[:-4]) != footer.summary_crc:
+        if zlib.crc32(records + data[:-4]) != footer.summary_crc and (checked or footer.summary_crc):
             return None
         return _summary_of(footer.summary_start, records)
     except (DamageError, *NONSENSE):

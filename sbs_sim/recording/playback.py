@@ -1,0 +1,138 @@
+"""Reading a recording message by message in the order of time, begun at once and checked chunk by chunk."""
+
+import heapq
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
+
+from sbs_sim.errors import RecordingError
+from sbs_sim.recording.scan import Content, DamageError, Extent, Scan, Source, chunk_at, open_recording, run_at, scan
+
+Entry = tuple[int, int, int, int, bytes]  # log time [ns], place of the chunk and in it, channel, data
+
+
+class Playback:
+    """A recording to be played; a context that closes it.
+
+    With a summary nothing but that is read in advance, else the whole file is.
+
+    Parameters
+    ----------
+    path : Path
+
+    Attributes
+    ----------
+    schemas, channels : dict
+        Records by number.
+    warning : str
+        What is wrong with the file all the same; empty if nothing is.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be read, or is not whole.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._source = Source(path)
+        try:
+            self._trust, summary = open_recording(self._source)
+            if summary is not None and summary.channels and summary.chunks:
+                self.schemas, self.channels, self._chunks = summary.schemas, summary.channels, summary.chunks
+            else:
+                found = self._all()
+                self.schemas, self.channels, self._chunks = found.schemas, found.channels, found.chunks
+        except BaseException:
+            self.close()
+            raise
+        unchecked = self._trust.content and bool(self._chunks)
+        self.warning = f"{path} has no checksums: damage cannot be found" if unchecked else ""
+
+    def _all(self) -> Scan:
+        found = scan(self._source, lambda content: None)
+        if not found.complete:
+            raise RecordingError(
+                f"{self.path} is not whole ({found.reasons[0]}): `replay --recover {self.path}` saves what is"
+            )
+        return found
+
+    def messages(self, start: float = 0.0, end: float = math.inf) -> Iterator[tuple[int, int, bytes]]:
+        """Log time [ns], channel and data of the messages of a part of the recording.
+
+        Parameters
+        ----------
+        start, end : float
+            From the first message on [s].
+
+        Raises
+        ------
+        RecordingError
+            A chunk is damaged; everything before it has been given.
+        """
+        first: int | None = None
+        for log_time, _, _, channel, data in self._in_order(start, end):
+            first = log_time if first is None else first
+            since = (log_time - first) * 1e-9
+            if since > end:
+                return
+            if since >= start:
+                yield log_time, channel, data
+
+    def _in_order(self, start: float, end: float) -> Iterator[Entry]:
+        """All messages in the order of their time, but for chunks that lie between the first message and the start."""
+        waiting: list[Entry] = []
+        first: int | None = None
+        for place, (_, earliest, latest) in sorted(self._chunks.items(), key=lambda item: (item[1][1], item[0])):
+            while waiting and waiting[0][0] < earliest:
+                yield heapq.heappop(waiting)
+            if first is not None and (earliest - first) * 1e-9 > end:
+                break
+            if first is not None and (latest - first) * 1e-9 < start:
+                continue
+            content = self._content(place)
+            for channel, _, log_time, _, begin, behind in content.messages:
+                heapq.heappush(waiting, (log_time, place, begin, channel, content.data[begin:behind]))
+            if first is None and waiting:
+                first = waiting[0][0]
+        while waiting:
+            yield heapq.heappop(waiting)
+
+    def _content(self, place: int) -> Content:
+        """What was announced for a place, or an error."""
+        source, expected = self._source, self._chunks[place]
+        try:
+            if source.at(place, 1)[0] == Opcode.CHUNK or not self._trust.content:
+                content, _, _ = chunk_at(source, place, source.size, self._trust.content)
+            else:
+                content, _ = run_at(source, place, source.size)
+            _check_extent(content, expected)
+        except DamageError as damage:
+            hint = f"`replay --recover {self.path}` saves what is whole"
+            raise RecordingError(f"{self.path} is damaged (byte {place}: {damage}): {hint}") from None
+        return content
+
+    def schema(self, channel: Channel) -> Schema | None:
+        """Type of a channel, if it has one."""
+        return self.schemas.get(channel.schema_id)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._source.close()
+
+    def __enter__(self) -> "Playback":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _check_extent(content: Content, expected: Extent) -> None:
+    if content.extent() != expected:
+        raise DamageError("the chunk is not the one that was recorded here")

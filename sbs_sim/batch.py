@@ -104,11 +104,15 @@ class Batch:
 
     def percentiles(self, name: str, shares: Sequence[float] = (5.0, 25.0, 50.0, 75.0, 95.0)) -> Array:
         """Percentiles over the flights that are in the air, shape (n_shares, n_rows, ...); NaN where there is none."""
-        values = self[name]
-        result = np.full((len(shares), *values.shape[1:]), np.nan)
-        flying = ~np.isnan(values).all(axis=0)
-        result[:, flying] = np.nanpercentile(values[:, flying], shares, axis=0)
-        return result
+        return percentiles(self[name], shares)
+
+
+def percentiles(values: Array, shares: Sequence[float]) -> Array:
+    """Percentiles of histories (n_flights, n_rows, ...) over the flights in the air, shape (n_shares, n_rows, ...)."""
+    result = np.full((len(shares), *values.shape[1:]), math.nan)
+    flying = ~np.isnan(values).all(axis=0)
+    result[:, flying] = np.nanpercentile(values[:, flying], shares, axis=0)
+    return result
 
 
 @dataclass(frozen=True)

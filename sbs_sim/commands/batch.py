@@ -31,12 +31,12 @@ def main() -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="batch",
-        description="Fly many flights through turbulence, each with gusts of its own and with the controls of its trim,"
-        " on all cores or on a cluster.",
+        description="Fly many flights through turbulence, hands off: each is trimmed, keeps the controls of its trim,"
+        " and has gusts of its own. On all cores or on a cluster.",
     )
     group = parser.add_argument_group("flights")
     group.add_argument("--flights", type=int, default=1000, metavar="N", help="how many (default: 1000)")
-    group.add_argument("--duration", type=float, default=10.0, metavar="X", help="of each [s] (default: 10)")
+    group.add_argument("--duration", type=float, default=3.0, metavar="X", help="of each [s] (default: 3)")
     group.add_argument(
         "--turbulence", type=float, default=1.5, metavar="X", help="standard deviation of the air [m/s] (default: 1.5)"
     )

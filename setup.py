@@ -33,6 +33,7 @@ setup(
         *config_files(),
     ],
     install_requires=["setuptools"],
+    extras_require={"dask": ["distributed"]},  # sweeps and batches on a cluster
     zip_safe=False,
     entry_points={
         "console_scripts": [
@@ -43,6 +44,7 @@ setup(
             "trim = sbs_sim.commands.trim:main",
             "linearize = sbs_sim.commands.linearize:main",
             "sweep = sbs_sim.commands.sweep:main",
+            "batch = sbs_sim.commands.batch:main",
             "reproduce = sbs_sim.commands.reproduce:main",
             "plot = sbs_sim.commands.plot:main",
         ],

@@ -16,10 +16,14 @@ if TYPE_CHECKING:
     from sbs_sim.analysis.linearize import LinearModel, linearize
     from sbs_sim.analysis.sweep import Sweep, sweep
     from sbs_sim.analysis.trim import TrimPoint, trim
+    from sbs_sim.batch import Batch, Case, simulate_batch
     from sbs_sim.simulation import Simulation, simulate
 
 _HOME = {
     "Aircraft": "sbs_sim.aircraft",
+    "Batch": "sbs_sim.batch",
+    "Case": "sbs_sim.batch",
+    "simulate_batch": "sbs_sim.batch",
     "LinearModel": "sbs_sim.analysis.linearize",
     "linearize": "sbs_sim.analysis.linearize",
     "Sweep": "sbs_sim.analysis.sweep",
@@ -29,7 +33,20 @@ _HOME = {
     "Simulation": "sbs_sim.simulation",
     "simulate": "sbs_sim.simulation",
 }
-__all__ = ["Aircraft", "LinearModel", "Simulation", "Sweep", "TrimPoint", "linearize", "simulate", "sweep", "trim"]
+__all__ = [
+    "Aircraft",
+    "Batch",
+    "Case",
+    "LinearModel",
+    "Simulation",
+    "Sweep",
+    "TrimPoint",
+    "linearize",
+    "simulate",
+    "simulate_batch",
+    "sweep",
+    "trim",
+]
 
 
 def __getattr__(name: str) -> Any:

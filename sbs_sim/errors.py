@@ -45,5 +45,13 @@ class SweepError(SbsError):
     """A sweep that cannot start."""
 
 
+class BatchError(SbsError):
+    """A batch of flights that cannot start."""
+
+
+class ClusterError(SbsError):
+    """A cluster that cannot be reached, or whose workers are not like this process."""
+
+
 class ExportError(SbsError):
     """A file that cannot be written."""

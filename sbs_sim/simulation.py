@@ -8,7 +8,7 @@ give the same flight to the last bit.
 import collections
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -20,18 +20,22 @@ from sbs_sim.errors import SimulationError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.dynamics import derivative
+from sbs_sim.model.fly import fly
 from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
 from sbs_sim.model.integrate import PARTITIONED, RK4, TSIT5, advance
+from sbs_sim.model.kernel import Address
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.wind import Wind, WindField, wind_at
 
 Array = NDArray[np.float64]
+Commands = ArrayLike | Callable[[float], ArrayLike]
 
 UNIT = 1e-9  # a quaternion whose norm is this near to one is a unit quaternion
 METHODS = {"rk4": RK4, "tsit5": TSIT5, "partitioned": PARTITIONED}
 
 # A tick is one uninterrupted call of compiled code; this many steps take it a tenth of a second.
 MOST_STEPS_PER_TICK = 10_000
+BLOCK = 1000  # ticks that whole flights take in one call
 
 # Beyond these magnitudes a state is not plausible and the simulation stops. The angles and the inflow are far outside
 # the validity of the model; the velocity is beyond the speed of sound.
@@ -74,6 +78,30 @@ class Snapshot:
     azimuth: Array
     loads: Array
     wind: Array
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Instants of a flight one below the other: what `Snapshot` tells, with one more axis in front of each.
+
+    Attributes
+    ----------
+    step, time, state, acceleration, swashplate, azimuth, loads, wind : ndarray
+        See `Snapshot`; acceleration and loads are zero where they were not asked for.
+    """
+
+    step: NDArray[np.int64]
+    time: Array
+    state: Array
+    acceleration: Array
+    swashplate: Array
+    azimuth: Array
+    loads: Array
+    wind: Array
+
+    def first(self, count: int) -> "Rows":
+        """The first instants."""
+        return Rows(*(getattr(self, part.name)[:count] for part in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -292,27 +320,104 @@ class Simulation:
         )
         self.step += done
         if culprit >= 0:
-            value = self._work.stages[0][culprit]
-            raise SimulationError(
-                f"step {self.step + 1} (t = {(self.step + 1) * self.step_size:.4f} s) would take"
-                f" {self.layout.names[culprit]} to {value:g}: plausible are magnitudes"
-                f" up to {self._bounds[culprit]:g}"
-            )
+            raise self._end(culprit)
         self._air = self._field.next_tick()
+
+    def _end(self, culprit: int) -> SimulationError:
+        """Why the flight cannot go on: a state that the next step would take beyond the plausible."""
+        value = self._work.stages[0][culprit]
+        return SimulationError(
+            f"step {self.step + 1} (t = {(self.step + 1) * self.step_size:.4f} s) would take"
+            f" {self.layout.names[culprit]} to {value:g}: plausible are magnitudes"
+            f" up to {self._bounds[culprit]:g}"
+        )
+
+    def fly(
+        self, swashplates: Array, ticks: int, every: int = 1, loaded: bool = True
+    ) -> tuple[Rows, SimulationError | None]:
+        """Fly many ticks in one call of compiled code, during which other threads go on.
+
+        To the last bit it is what `set_swashplate`, `snapshot` and `advance` give tick by tick.
+
+        Parameters
+        ----------
+        swashplates : ndarray, shape (ticks, n_rotors, 3) or (ticks + 1, n_rotors, 3)
+            Angles of each tick [rad], see `checked_swashplate`. One more is in force at the end of the flight, which
+            then is told of as well.
+        ticks : int
+        every : int
+            Ticks from one row of the result to the next, counted from the start of the flight.
+        loaded : bool
+            False leaves accelerations and loads out.
+
+        Returns
+        -------
+        rows : Rows
+        fault : SimulationError or None
+            Why the flight ended before its last tick, see `advance`; it cannot go on then.
+        """
+        air = np.concatenate([self._air[np.newaxis], self._field.next_ticks(ticks)])
+        begin = self.step // self.steps_per_tick
+        told = np.arange(-(-begin // every) * every - begin, len(swashplates), every)
+        rows = self._rows((begin + told) * self.steps_per_tick, swashplates[told], air[told], loaded)
+        x, first, options = self.state, swashplates[0], (self._method, self._bounds, self._work)
+        start = (self._azimuth0, self.step, self.steps_per_tick, self.step_size)
+        machine_code = (
+            Address(advance, self._params, x, first, *start, air[0], *options),
+            Address(derivative, self._params, x, first, self._azimuth0, self._slope[:3], self._work, self._slope),
+        )
+        offset = int(told[0]) if len(told) else len(swashplates)
+        outputs = (rows.azimuth, rows.wind, rows.state, rows.acceleration, rows.loads, self._slope)
+        self.step, culprit = fly(
+            *(*machine_code, self._params, x, *start, *options),
+            *(swashplates, air, ticks, offset, every, loaded, *outputs),
+        )
+        self._air, self.swashplate = air[ticks], swashplates[-1].copy()
+        rows = rows.first(int(np.count_nonzero(rows.step <= self.step)))
+        if loaded:
+            for state, acceleration in zip(rows.state, rows.acceleration, strict=True):
+                acceleration += self._gravity(state)
+        return rows, self._end(culprit) if culprit >= 0 else None
+
+    def _rows(self, steps: NDArray[np.int64], swashplates: Array, air: Array, loaded: bool) -> Rows:
+        """Rows of which the flight fills in state, force and loads."""
+        count, rotors = len(steps), len(self._azimuth0)
+        wind = np.zeros((count, 3))
+        if loaded:
+            for row, step, velocity in zip(air, steps, wind, strict=True):
+                wind_at(row, step * self.step_size, 0.0, velocity)
+        return Rows(
+            step=steps,
+            time=np.multiply(steps, self.step_size, dtype=float),
+            state=np.zeros((count, self.layout.size)),
+            acceleration=np.zeros((count, 3)),
+            swashplate=swashplates,
+            azimuth=np.array([self._azimuths(step) for step in steps]).reshape(count, rotors),
+            loads=np.zeros((count, rotors, P.LOAD_SIZE)),
+            wind=wind,
+        )
+
+    def _gravity(self, state: Array) -> Array:
+        """Gravity in body axes [m/s^2], shape (3,)."""
+        down: Array = rotation_matrix(state[S.ATTITUDE : S.ATTITUDE + 4])[2]
+        return down * self._params.air[P.GRAVITY]
+
+    def _azimuths(self, step: int) -> Array:
+        """Azimuth of every rotor at a step, shape (n_rotors,) [rad], 0 to 2 pi."""
+        turned: Array = self._azimuth0 + self._params.rotor[:, P.SPEED] * self.step_size * step
+        return turned % (2 * math.pi)
 
     def snapshot(self) -> Snapshot:
         """The present instant, with loads and accelerations under the swashplate angles now in force."""
-        speeds = self._params.rotor[:, P.SPEED]
-        azimuth = (self._azimuth0 + speeds * self.step_size * self.step) % (2 * math.pi)
+        azimuth = self._azimuths(self.step)
         air = np.zeros(3)
         wind_at(self._air, self.time, 0.0, air)
         derivative(self._params, self.state, self.swashplate, azimuth, air, self._work, self._slope)
-        gravity = rotation_matrix(self.state[3:7])[2] * self._params.air[P.GRAVITY]
         return Snapshot(
             step=self.step,
             time=self.time,
             state=self.state.copy(),
-            acceleration=self._work.vector[:3] + gravity,
+            acceleration=self._work.vector[:3] + self._gravity(self.state),
             swashplate=self.swashplate.copy(),
             azimuth=azimuth,
             loads=self._work.loads.copy(),
@@ -445,7 +550,7 @@ def blade_angles(aircraft: Aircraft, snapshot: Snapshot) -> list[tuple[Array, Ar
 def simulate(
     aircraft: Aircraft,
     start: TrimPoint | ArrayLike,
-    controls: ArrayLike | Callable[[float], ArrayLike],
+    controls: Commands,
     duration: float,
     *,
     tick: float = 0.01,
@@ -481,34 +586,99 @@ def simulate(
     SimulationError
         See `Simulation`.
     """
+    options: dict[str, Any] = {
+        "tick": tick,
+        "azimuth_step": azimuth_step,
+        "lead_lag": lead_lag,
+        "cyclic_inflow": cyclic_inflow,
+        "method": method,
+    }
+    histories, fault = fly_commands(aircraft, start, controls, duration, wind=wind, **options)
+    if fault is not None:
+        raise fault
+    return histories
+
+
+def fly_commands(
+    aircraft: Aircraft,
+    start: TrimPoint | ArrayLike,
+    controls: Commands,
+    duration: float,
+    *,
+    every: int = 1,
+    loaded: bool = True,
+    wind: Wind | None = None,
+    **options: Any,
+) -> tuple[dict[str, Array], SimulationError | None]:
+    """Fly as `simulate` does, as far as it goes.
+
+    Parameters
+    ----------
+    aircraft, start, controls, duration, wind
+        See `simulate`.
+    every : int
+        Ticks from one row of the histories to the next.
+    loaded : bool
+        False leaves "acceleration", "thrust", "torque" and "power" out.
+    **options :
+        The others of `Simulation`.
+
+    Returns
+    -------
+    histories : dict of str to ndarray
+        See `simulate`; up to the last good tick.
+    fault : SimulationError or None
+        Why the flight ended early.
+
+    Raises
+    ------
+    SimulationError
+        The flight cannot begin.
+    """
     if not 0.0 <= duration <= 1e6:
         raise SimulationError(f"duration = {duration}: allowed are 0 to 1e+06 s")
     air = wind or Wind()
     state = trimmed_state(aircraft, start, wind=air.velocity) if isinstance(start, TrimPoint) else start
     command = _command(controls)
-    simulation = Simulation(
-        aircraft,
-        state,
-        aircraft.mix(command(0, 0.0)),
-        tick=tick,
-        azimuth_step=azimuth_step,
-        lead_lag=lead_lag,
-        cyclic_inflow=cyclic_inflow,
-        method=method,
-        wind=air,
-    )
-    ticks = round(duration / tick)
-    snapshots, given = [], []
-    for i in range(ticks + 1):
-        given.append(command(i, simulation.time))
-        simulation.set_swashplate(aircraft.mix(given[-1]))
-        snapshots.append(simulation.snapshot())
-        if i < ticks:
-            simulation.advance()
-    return _histories(aircraft, snapshots, given)
+    simulation = Simulation(aircraft, state, aircraft.mix(command(0, 0.0)), wind=air, **options)
+    ticks = round(duration / simulation.tick)
+    blocks: list[tuple[Rows, Array]] = []
+    fault: SimulationError | None = None
+    for begin in range(0, ticks + 1, BLOCK):
+        end = min(begin + BLOCK, ticks + 1)
+        given, angles, wrong = _angles(simulation, command, begin, end)
+        if len(angles):
+            rows, fault = simulation.fly(angles, min(len(angles), ticks - begin), every, loaded)
+            blocks.append((rows, given[rows.step // simulation.steps_per_tick - begin]))
+        fault = fault or wrong
+        if fault is not None:
+            break
+    if not blocks and fault is not None:
+        raise fault
+    return _histories(aircraft, blocks, loaded), fault
 
 
-def _command(controls: ArrayLike | Callable[[float], ArrayLike]) -> Callable[[int, float], Array]:
+def _angles(
+    simulation: Simulation, command: Callable[[int, float], Array], begin: int, end: int
+) -> tuple[Array, Array, SimulationError | None]:
+    """Controls and swashplate angles of ticks, up to the first that are out of range, and what is wrong with those."""
+    given: list[Array] = []
+    angles: list[Array] = []
+    wrong: SimulationError | None = None
+    for i in range(begin, end):
+        controls = command(i, i * simulation.steps_per_tick * simulation.step_size)
+        if not given or controls.tobytes() != given[-1].tobytes():
+            try:
+                checked = simulation.checked_swashplate(simulation.aircraft.mix(controls))
+            except SimulationError as error:
+                wrong = error
+                break
+        given.append(controls)
+        angles.append(checked)
+    return np.array(given), np.array(angles), wrong
+
+
+def _command(controls: Commands) -> Callable[[int, float], Array]:
     """Controls of tick i at a time, whatever way they were given."""
     if callable(controls):
         function = controls
@@ -530,17 +700,21 @@ def _four(values: ArrayLike) -> Array:
     return array
 
 
-def _histories(aircraft: Aircraft, snapshots: list[Snapshot], given: list[Array]) -> dict[str, Array]:
-    states = np.array([snapshot.state for snapshot in snapshots])
-    loads = np.array([snapshot.loads for snapshot in snapshots])
-    speeds = np.array([rotor.speed for rotor in aircraft.rotors])
+def _histories(aircraft: Aircraft, blocks: Sequence[tuple[Rows, Array]], loaded: bool) -> dict[str, Array]:
+    states = np.concatenate([rows.state for rows, _ in blocks])
     named = {name: states[:, i] for i, name in enumerate(aircraft.layout.names)}
-    return named | {
-        "time": np.array([snapshot.time for snapshot in snapshots]),
+    flown = named | {
+        "time": np.concatenate([rows.time for rows, _ in blocks]),
         "state": states,
-        "controls": np.array(given),
-        "swashplate": np.array([snapshot.swashplate for snapshot in snapshots]),
-        "acceleration": np.array([snapshot.acceleration for snapshot in snapshots]),
+        "controls": np.concatenate([given for _, given in blocks]),
+        "swashplate": np.concatenate([rows.swashplate for rows, _ in blocks]),
+    }
+    if not loaded:
+        return flown
+    loads = np.concatenate([rows.loads for rows, _ in blocks])
+    speeds = np.array([rotor.speed for rotor in aircraft.rotors])
+    return flown | {
+        "acceleration": np.concatenate([rows.acceleration for rows, _ in blocks]),
         "thrust": loads[:, :, P.THRUST],
         "torque": loads[:, :, P.TORQUE],
         "power": loads[:, :, P.TORQUE] * speeds,

@@ -6,6 +6,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.trim import trim
 from sbs_sim.model.kernel import cache_folder
+from sbs_sim.model.wind import Wind
 from sbs_sim.simulation import simulate
 
 
@@ -13,7 +14,7 @@ def main() -> None:
     """Use every entry once, which compiles it, and delete the machine code of earlier sources."""
     aircraft = Aircraft.load("sbs")
     hover = trim(aircraft)
-    simulate(aircraft, hover, hover.controls, duration=0.01)
+    simulate(aircraft, hover, hover.controls, duration=0.01, wind=Wind(turbulence_intensity=(1.0, 1.0, 1.0)))
     linearize(aircraft, point=hover, method="paper")
     trim(aircraft, method="two_loop")
     folder = cache_folder()

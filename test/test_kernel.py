@@ -12,7 +12,7 @@ CODE = """
 
     import numpy as np
 
-    from sbs_sim import Aircraft, linearize, simulate, trim
+    from sbs_sim import Aircraft, Simulation, linearize, simulate, trim
     from sbs_sim.model.dynamics import derivative
     from sbs_sim.model import params as P
     from sbs_sim.simulation import trimmed_state
@@ -24,6 +24,13 @@ CODE = """
     for what in sys.argv[1:]:
         if what == "simulate":
             results[what] = simulate(aircraft, point, point.controls + 0.01, duration=0.1)["state"].tobytes()
+        elif what == "ticks":
+            simulation = Simulation(aircraft, trimmed_state(aircraft, point), aircraft.mix(point.controls + 0.01))
+            states = [simulation.state.copy()]
+            for _ in range(10):
+                simulation.advance()
+                states.append(simulation.state.copy())
+            results["simulate"] = np.array(states).tobytes()
         elif what == "linearize":
             results[what] = linearize(aircraft, point=point).a.tobytes()
         elif what == "derivative":
@@ -38,6 +45,7 @@ ORDERS = [
     ("simulate", "linearize", "derivative"),
     ("derivative", "linearize", "simulate"),
     ("linearize", "derivative", "simulate", "other"),
+    ("derivative", "linearize", "ticks"),  # the same flight, without the call that takes many ticks at once
 ]
 
 

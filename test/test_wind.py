@@ -179,6 +179,15 @@ def test_equal_seeds_give_equal_fields_and_others_do_not():
     assert np.ptp(field, axis=0).min() > 0
 
 
+def test_ticks_ahead_are_those_one_by_one():
+    wind = dataclasses.replace(TURBULENT, turbulence_seed=5, velocity=(1.0, 2.0, 3.0), gust=(0.0, 1.0, 0.0))
+    field = WindField(wind, 2.0, 0.01)
+    one_by_one = np.array([field.next_tick().copy() for _ in range(40)])
+    field = WindField(wind, 2.0, 0.01)
+    blocks = [field.next_ticks(7), field.next_tick().copy()[np.newaxis], field.next_ticks(0), field.next_ticks(32)]
+    np.testing.assert_array_equal(np.concatenate(blocks), one_by_one)
+
+
 def test_the_largest_seed_works():
     wind = dataclasses.replace(TURBULENT, turbulence_seed=2**64 - 1)
     assert np.isfinite(turbulence(wind, 0.01, 3)).all()

@@ -1,16 +1,14 @@
-"""Sweeps: trims and linear models along one parameter, on all cores.
+"""Sweeps: trims and linear models along one parameter, on all cores or on a cluster.
 
 Every point is solved for itself, from hover, so that neither the number of workers nor the other points change it.
 """
 
+import itertools
 import math
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property, partial
-from queue import Empty, SimpleQueue
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +21,10 @@ from sbs_sim.analysis.modes import Mode
 from sbs_sim.analysis.trim import TrimPoint, trim
 from sbs_sim.errors import AircraftError, SbsError, SweepError
 from sbs_sim.model import state as S
+from sbs_sim.parallel import checked_workers, compute
+
+if TYPE_CHECKING:
+    import distributed
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -35,8 +37,6 @@ QUANTITIES = {  # of a trim, beside its states
     **dict.fromkeys(("residual", "iterations"), "1"),
 }
 CANCELLED = "cancelled"
-MOST_WORKERS = 256
-POLL_PERIOD = 0.05  # s between looks whether the caller wants to go on
 
 
 @dataclass(frozen=True)
@@ -200,6 +200,7 @@ def sweep(
     workers: int | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
+    dask: "str | distributed.Client | None" = None,
 ) -> Sweep:
     """Trim, and linearize, along one parameter.
 
@@ -220,6 +221,10 @@ def sweep(
         Called with the point, the number of points done and that of all, in the calling thread, as each ends.
     cancelled : callable, optional
         Asked several times a second; after a True no further point is begun, and the rest has the error "cancelled".
+    dask : str or distributed.Client, optional
+        Address of the scheduler of a dask cluster, "tcp://HOST:PORT", or a client: its workers solve the points in
+        place of threads. The results are the same; workers with other versions are refused, and what a lost worker
+        had to do is done again.
 
     Returns
     -------
@@ -230,13 +235,25 @@ def sweep(
     ------
     SweepError
         No values, one that is not finite, an unknown parameter, no whole number of workers.
+    ClusterError
+        A cluster that cannot be reached, or that would not give the same.
     """
     numbers = _checked_values(values)
     _check_parameter(aircraft, parameter)
     condition = {"airspeed": airspeed, "climb_rate": climb_rate, "sideslip": sideslip, "turn_rate": turn_rate}
     fidelity = {"lead_lag": lead_lag, "cyclic_inflow": cyclic_inflow, "azimuth_count": azimuth_count}
-    solve = partial(_solve, aircraft, parameter, {**condition, **fidelity}, linear)
-    return Sweep(parameter, tuple(_solve_all(solve, numbers, _checked_workers(workers), progress, cancelled)))
+    count = checked_workers(workers, dask, SweepError)
+    points = [SweepPoint(value, None, None, CANCELLED) for value in numbers]
+    done = itertools.count(1)
+
+    def keep(i: int, point: SweepPoint) -> None:
+        points[i] = point
+        if progress is not None:
+            progress(point, next(done), len(points))
+
+    calls = [(aircraft, parameter, {**condition, **fidelity}, linear, value) for value in numbers]
+    compute(_solve, calls, keep, workers=count, cancelled=cancelled, dask=dask)
+    return Sweep(parameter, tuple(points))
 
 
 def _checked_values(values: ArrayLike) -> list[float]:
@@ -259,52 +276,6 @@ def _check_parameter(aircraft: Aircraft, parameter: str) -> None:
         aircraft.value(parameter)
     except AircraftError as error:
         raise SweepError(f"parameter {parameter!r}: allowed are {', '.join(CONDITIONS)} or a path; {error}") from None
-
-
-def _checked_workers(workers: int | None) -> int:
-    if workers is None:
-        return len(os.sched_getaffinity(0))
-    if isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= MOST_WORKERS:
-        raise SweepError(f"workers = {workers!r}: allowed are whole numbers from 1 to {MOST_WORKERS}")
-    return workers
-
-
-def _solve_all(
-    solve: Callable[[float], SweepPoint],
-    values: Sequence[float],
-    workers: int,
-    progress: Progress | None,
-    cancelled: Callable[[], bool] | None,
-) -> list[SweepPoint]:
-    """Points of all values, in their order."""
-    points: dict[int, SweepPoint] = {}
-    ended: SimpleQueue[Future[SweepPoint]] = SimpleQueue()
-    pool = ThreadPoolExecutor(workers, thread_name_prefix="sweep")
-    try:
-        places = {pool.submit(solve, value): i for i, value in enumerate(values)}
-        for future in places:
-            future.add_done_callback(ended.put)  # at once, if it has ended already or is cancelled
-        stopped = False
-        while len(points) < len(values):
-            try:
-                future = ended.get(timeout=POLL_PERIOD)
-            except Empty:
-                pass
-            else:
-                place = places[future]
-                if future.cancelled():
-                    points[place] = SweepPoint(values[place], None, None, CANCELLED)
-                else:
-                    points[place] = future.result()
-                    if progress is not None:
-                        progress(points[place], len(points), len(values))
-            if not stopped and cancelled is not None and cancelled():
-                stopped = True
-                for future in places:
-                    future.cancel()  # does nothing to those that are being solved
-    finally:
-        pool.shutdown(cancel_futures=True)
-    return [points[i] for i in range(len(values))]
 
 
 def _solve(aircraft: Aircraft, parameter: str, given: dict[str, Any], linear: bool, value: float) -> SweepPoint:

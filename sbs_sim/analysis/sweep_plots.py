@@ -6,7 +6,7 @@ their dashes.
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
 from typing import Literal
@@ -57,15 +57,20 @@ def save_plots(sweep: Sweep, folder: str | Path) -> list[Path]:
     ExportError
         Folder or files cannot be written.
     """
-    try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as error:
-        raise ExportError(f"{folder}: no folder can be made there: {getattr(error, 'strerror', error)}") from None
     figures = {}
     if any(point.trim for point in sweep.points):
         figures["trim"] = trim_figure(sweep)
     if sweep.modes:
         figures["root_locus"] = root_locus_figure(sweep)
+    return save_figures(figures, folder)
+
+
+def save_figures(figures: Mapping[str, Figure], folder: str | Path) -> list[Path]:
+    """Write figures by name as PNG and SVG; see `save_plots`."""
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise ExportError(f"{folder}: no folder can be made there: {getattr(error, 'strerror', error)}") from None
     written = []
     for name, figure in figures.items():
         for kind in FORMATS:

@@ -10,7 +10,8 @@ import math
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from sbs_sim.errors import SbsError
@@ -71,7 +72,7 @@ def add_flight_arguments(parser: argparse.ArgumentParser) -> None:
         "--set",
         action="append",
         default=[],
-        type=_assignment,
+        type=assignment,
         metavar="PATH=VALUE",
         help="change a value of the aircraft file: body.mass=25, rotors.radius=0.5 (of every rotor),"
         " rotors.MR1.hub[0]=0.01; may be given several times",
@@ -94,7 +95,18 @@ def add_flight_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _assignment(text: str) -> tuple[str, Any]:
+def add_worker_arguments(group: "argparse._ArgumentGroup") -> None:
+    """Who does the work."""
+    group.add_argument("--workers", type=int, metavar="N", help="threads (default: one for each core)")
+    group.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="leave the work to a dask cluster, whose scheduler is at tcp://HOST:PORT; the results are the same",
+    )
+
+
+def assignment(text: str) -> tuple[str, Any]:
+    """Path and value of PATH=VALUE."""
     path, equals, value = text.partition("=")
     if not equals or not path:
         raise argparse.ArgumentTypeError(f"{text!r}: allowed is PATH=VALUE, for example body.mass=25")
@@ -132,6 +144,18 @@ def flight(arguments: argparse.Namespace) -> dict[str, Any]:
         "cyclic_inflow": arguments.cyclic_inflow,
         "azimuth_count": arguments.azimuth_count,
     }
+
+
+@contextmanager
+def progress_bar(total: int, unit: str) -> Iterator[Callable[..., None] | None]:
+    """What to call when one of `total` parts is done: a bar on stderr where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=total, unit=unit, file=sys.stderr, leave=False) as bar:
+        yield lambda *_: bar.update()
 
 
 # --- printing ---------------------------------------------------------------------------------------------------

@@ -2,25 +2,24 @@
 
 import argparse
 import math
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from sbs_sim.commands.common import (
     DEGREES,
     UsageError,
     add_flight_arguments,
+    add_worker_arguments,
     aircraft,
     execute,
     fixed,
     flight,
     print_table,
+    progress_bar,
 )
 from sbs_sim.errors import SweepError
 
 if TYPE_CHECKING:
-    from sbs_sim.analysis.sweep import Progress, Sweep, SweepPoint
+    from sbs_sim.analysis.sweep import Sweep, SweepPoint
 
 # As they are typed, and the names of `sbs_sim.analysis.sweep`; all other parameters are paths.
 TYPED = {
@@ -41,7 +40,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="sweep",
         usage="sweep PARAMETER (START STOP COUNT | --values X [X ...]) [options]",
-        description="Trim and linearize an aircraft along one parameter, on all cores.",
+        description="Trim and linearize an aircraft along one parameter, on all cores or on a cluster.",
     )
     parser.add_argument(
         "parameter",
@@ -54,7 +53,7 @@ def _parser() -> argparse.ArgumentParser:
     add_flight_arguments(parser)
     group = parser.add_argument_group("work and output")
     group.add_argument("--trims-only", dest="linear", action="store_false", help="no linear models")
-    group.add_argument("--workers", type=int, metavar="N", help="threads (default: one for each core)")
+    add_worker_arguments(group)
     group.add_argument("--out", metavar="DIR", help="write plots as PNG and SVG into this folder")
     group.add_argument("--csv", metavar="FILE", help="write a table of trims and poles, in SI units and radians")
     group.add_argument("--json", metavar="FILE", help="write all trims and models, in SI units and radians")
@@ -75,7 +74,7 @@ def _work(arguments: argparse.Namespace) -> None:
     check_target(arguments.csv)
     check_target(arguments.json)
     craft = aircraft(arguments)
-    with _progress_bar(len(values)) as progress:
+    with progress_bar(len(values), " points") as progress:
         found = sweep(
             craft,
             parameter,
@@ -83,6 +82,7 @@ def _work(arguments: argparse.Namespace) -> None:
             **flight(arguments),
             linear=arguments.linear,
             workers=arguments.workers,
+            dask=arguments.dask,
             progress=progress,
         )
     _print_sweep(found)
@@ -111,22 +111,6 @@ def _values(arguments: argparse.Namespace) -> list[float]:
         raise UsageError(f"COUNT = {count:g}: allowed are whole numbers from 1 to {MOST_POINTS}")
     steps = max(int(count) - 1, 1)
     return [start + (stop - start) * i / steps for i in range(int(count))]
-
-
-@contextmanager
-def _progress_bar(total: int) -> Iterator["Progress | None"]:
-    """A bar on stderr where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from tqdm import tqdm
-
-    with tqdm(total=total, unit=" points", file=sys.stderr, leave=False) as bar:
-
-        def progress(_point: "SweepPoint", _done: int, _total: int) -> None:
-            bar.update()
-
-        yield progress
 
 
 def _print_sweep(found: "Sweep") -> None:

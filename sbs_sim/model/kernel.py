@@ -1,7 +1,8 @@
 """How this package compiles its numerical functions.
 
 Two decorators: `kernel` for the pieces, which vanish into their callers, and `entry` for the few
-functions that Python calls, whose machine code is kept on disk.
+functions that Python calls, whose machine code is kept on disk. Where one entry needs another, it is
+given the other's `Address` as an argument.
 """
 
 import contextlib
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.types import WrapperAddressProtocol
 
 # Everything that `fastmath` means except "there is no NaN" and "there is no infinity": the checks that
 # keep such numbers out of the state must survive the optimiser.
@@ -29,11 +31,48 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk."""
+    return _kept(function, OPTIONS)
+
+
+def exact_entry(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile an `entry` that does every operation as it is written: for what must not hang on where a loop ends."""
+    return _kept(function, {**OPTIONS, "fastmath": False})
+
+
+def _kept(function: Callable[..., Any], options: dict[str, Any]) -> Callable[..., Any]:
     # numba names caches after the path of the source, and colcon's symlink install gives one file two paths
     real = os.path.realpath(function.__code__.co_filename)
     function.__code__ = function.__code__.replace(co_filename=real)
     with _cache_in(cache_folder()):
-        return numba.njit(cache=True, **OPTIONS)(function)
+        return numba.njit(cache=True, **options)(function)
+
+
+class Address(WrapperAddressProtocol):
+    """The machine code of an entry, as an argument with which another entry calls it.
+
+    An entry that named another one would hold its machine code a second time, optimised otherwise. By its address it
+    executes the very instructions that Python does, to the same last bit.
+
+    Parameters
+    ----------
+    function : callable
+        An entry.
+    *arguments :
+        A call's, which select among the machine codes of different types of arguments.
+    """
+
+    def __init__(self, function: Any, *arguments: Any) -> None:
+        types = tuple(numba.typeof(argument) for argument in arguments)
+        function.compile(types)  # takes it from the cache; does nothing where it is there
+        self._code = function.overloads[types]
+
+    def __wrapper_address__(self) -> int:
+        """Where the code is; numba asks for it."""
+        return int(self._code.library.get_pointer_to_function(self._code.fndesc.llvm_cfunc_wrapper_name))
+
+    def signature(self) -> Any:
+        """Types of arguments and result; numba asks for them."""
+        return self._code.signature
 
 
 def cache_folder() -> Path:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.errors import SimulationError
-from sbs_sim.model.kernel import kernel
+from sbs_sim.model.kernel import exact_entry, kernel
 
 Array = NDArray[np.float64]
 
@@ -120,19 +120,22 @@ class WindField:
         self._array[GUST : GUST + 3] = wind.gust
         self._array[GUST_START] = start + wind.gust_delay
         self._array[GUST_DURATION] = wind.gust_duration
-        self._turbulence = None
-        if any(wind.turbulence_intensity):
-            self._turbulence = DrydenTurbulence(wind, tick)
-            self._array[TURBULENCE_TO : TURBULENCE_TO + 3] = self._turbulence.velocity()
+        self._turbulence = DrydenTurbulence(wind, tick) if any(wind.turbulence_intensity) else None
 
     def next_tick(self) -> Array:
         """Array of the next tick, shape (WIND_SIZE,); the same memory at every call."""
         if self._turbulence is not None:
-            ends = self._array[TURBULENCE_TO : TURBULENCE_TO + 3]
-            self._array[TURBULENCE_FROM : TURBULENCE_FROM + 3] = ends
-            self._turbulence.advance()
-            ends[:] = self._turbulence.velocity()
+            self._array[:] = self.next_ticks(1)[0]
         return self._array
+
+    def next_ticks(self, count: int) -> Array:
+        """Arrays of the next ticks, shape (count, WIND_SIZE): what `next_tick` gives one by one, bit for bit."""
+        rows = np.tile(self._array, (count, 1))
+        if self._turbulence is not None:
+            ends = self._turbulence.advance(count)
+            rows[:, TURBULENCE_FROM : TURBULENCE_FROM + 3] = ends[:-1]
+            rows[:, TURBULENCE_TO : TURBULENCE_TO + 3] = ends[1:]
+        return rows
 
 
 class DrydenTurbulence:
@@ -144,38 +147,56 @@ class DrydenTurbulence:
     """
 
     def __init__(self, wind: Wind, tick: float) -> None:
-        time = wind.turbulence_length / wind.turbulence_airspeed
+        ratio = tick * wind.turbulence_airspeed / wind.turbulence_length
         self._random = np.random.Generator(np.random.PCG64(wind.turbulence_seed))
-        self._sigma = np.array(wind.turbulence_intensity)
-        c, s = math.cos(wind.turbulence_direction), math.sin(wind.turbulence_direction)
-        self._to_ned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        ratio = tick / time
-        self._decay = math.exp(-ratio)
-        # States of 1/(1 + T s) and 1/(1 + T s)^2 in units of time T: z1' = -z1 + n, z2' = -z2 + z1.
-        self._step = self._decay * np.array([[1.0, 0.0], [ratio, 1.0]])
-        stationary = np.array([[0.5, 0.25], [0.25, 0.25]])
-        self._noise = _noise_of_step(ratio)
-        # the field is already there when the flight begins: start from its stationary distribution
-        self._states = np.linalg.cholesky(stationary) @ self._random.standard_normal((2, 2))
-        self._longitudinal = math.sqrt(0.5) * self._random.standard_normal()
+        decay = math.exp(-ratio)
+        spread = math.sqrt(0.5 * (1.0 - decay * decay))
+        direction = (math.cos(wind.turbulence_direction), math.sin(wind.turbulence_direction))
+        sigma = (float(value) for value in wind.turbulence_intensity)
+        self._filter = (decay, ratio, spread, *_noise_of_step(ratio), *direction, *sigma)
+        # The field is already there when the flight begins: start from its stationary distribution. In units of T,
+        # z1' = -z1 + n and z2' = -z2 + z1 have the covariance (1/2, 1/4; 1/4, 1/4).
+        first = self._random.standard_normal((2, 2))
+        z1, z2 = math.sqrt(0.5) * first[0], math.sqrt(0.125) * (first[0] + first[1])
+        self._states = np.array([math.sqrt(0.5) * self._random.standard_normal(), *z1, *z2])
 
-    def advance(self) -> None:
-        """Go on by one tick."""
-        noise = self._random.standard_normal((2, 3))
-        self._states = self._step @ self._states + self._noise @ noise[:, :2]
-        spread = math.sqrt(0.5 * (1.0 - self._decay * self._decay))
-        self._longitudinal = self._decay * self._longitudinal + spread * noise[0, 2]
+    def advance(self, count: int) -> Array:
+        """Go on by some ticks; velocity of the air now and after each of them, NED [m/s], shape (count + 1, 3)."""
+        velocities = np.empty((count + 1, 3))
+        _filtered(self._filter, self._random.standard_normal((count, 2, 3)), self._states, velocities)
+        return velocities
 
-    def velocity(self) -> Array:
-        """Velocity of the air now, NED [m/s], shape (3,)."""
+
+@exact_entry
+def _filtered(constants, noise, states, velocities):
+    """Filter the noise of `DrydenTurbulence.advance`, which goes on from `states` and changes them.
+
+    z1 and z2 are the states of 1/(1 + T s) and 1/(1 + T s)^2 in units of time T, of the lateral and the vertical
+    component; the longitudinal one has z1 alone.
+    """
+    decay, ratio, spread, n11, n21, n22, cosine, sine, sigma_x, sigma_y, sigma_z = constants
+    along, y1, z1, y2, z2 = states[0], states[1], states[2], states[3], states[4]
+    root2, root3 = math.sqrt(2.0), math.sqrt(3.0)
+    for i in range(len(velocities)):
         # (1 + sqrt(3) s) / (1 + s)^2 = sqrt(3) / (1 + s) + (1 - sqrt(3)) / (1 + s)^2
-        across = math.sqrt(3.0) * self._states[0] + (1.0 - math.sqrt(3.0)) * self._states[1]
-        filtered = np.array([math.sqrt(2.0) * self._longitudinal, across[0], across[1]])
-        return self._to_ned @ (self._sigma * filtered)
+        u = sigma_x * (root2 * along)
+        v = sigma_y * (root3 * y1 + (1.0 - root3) * y2)
+        velocities[i, 0] = cosine * u - sine * v
+        velocities[i, 1] = sine * u + cosine * v
+        velocities[i, 2] = sigma_z * (root3 * z1 + (1.0 - root3) * z2)
+        if i == len(noise):
+            break
+        first, second = noise[i, 0], noise[i, 1]
+        y2 = decay * (ratio * y1 + y2) + n21 * first[0] + n22 * second[0]
+        z2 = decay * (ratio * z1 + z2) + n21 * first[1] + n22 * second[1]
+        y1 = decay * y1 + n11 * first[0]
+        z1 = decay * z1 + n11 * first[1]
+        along = decay * along + spread * first[2]
+    states[0], states[1], states[2], states[3], states[4] = along, y1, z1, y2, z2
 
 
-def _noise_of_step(ratio: float) -> Array:
-    """Cholesky factor, shape (2, 2), of the covariance that noise adds to z1, z2 in a step of length `ratio`.
+def _noise_of_step(ratio: float) -> tuple[float, float, float]:
+    """Cholesky factor (11, 21, 22) of the covariance that noise adds to z1, z2 in a step of length `ratio`.
 
     That is the integral of exp(-2 s) (1, s; s, s^2) over the step. For a short step the last diagonal element is
     lost in rounding; zero stands for it then.
@@ -185,4 +206,4 @@ def _noise_of_step(ratio: float) -> Array:
     mixed = (1.0 - decay * (1.0 + 2.0 * ratio)) / 4.0
     second = (1.0 - decay * (1.0 + 2.0 * ratio + 2.0 * ratio**2)) / 4.0
     rest = max(0.0, second - mixed**2 / first)
-    return np.array([[math.sqrt(first), 0.0], [mixed / math.sqrt(first), math.sqrt(rest)]])
+    return math.sqrt(first), mixed / math.sqrt(first), math.sqrt(rest)

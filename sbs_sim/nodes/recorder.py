@@ -14,8 +14,9 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording import LogWriter, message_definition, qos_profiles
-from sbs_sim.recording.flight import attachments, simulation_metadata, versions
+from sbs_sim.recording.flight import attachments, simulation_metadata
 from sbs_sim.simulation import Simulation
+from sbs_sim.versions import versions
 
 CLOSING_TIME = 10.0  # s to get the rest of a log onto the disk
 

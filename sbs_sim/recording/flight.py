@@ -1,26 +1,23 @@
 """What a log of ours says of a flight: aircraft, options, events, states; and the flight flown again from them."""
 
-import importlib.metadata
 import io
 import itertools
-import platform
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding
 import numpy as np
 from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError
-from sbs_sim.model.kernel import source_digest
 from sbs_sim.model.wind import Wind
 from sbs_sim.recording.log import Log, Topic
 from sbs_sim.simulation import Event, Simulation, Snapshot, refly
+from sbs_sim.versions import versions
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -108,22 +105,6 @@ class Verification:
 
 
 # --- what goes into a log ---------------------------------------------------------------------------------------
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything that decides the bits of a result."""
-    packages = ("sbs_sim", "numpy", "numba", "llvmlite")
-    found = {name: importlib.metadata.version(name) for name in packages}
-    features = sorted(name for name, there in llvmlite.binding.get_host_cpu_features().items() if there)
-    return {
-        **found,
-        "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}",
-        "libc": " ".join(platform.libc_ver()),
-        "cpu": llvmlite.binding.get_host_cpu_name(),
-        "cpu_features": ",".join(features),
-        "model_sources": source_digest(),
-    }
 
 
 def simulation_metadata(simulation: Simulation) -> dict[str, str]:

@@ -1,0 +1,76 @@
+"""Times a batch of flights on one and on all cores: `./run python benchmarks/batch.py --help`.
+
+One thread, several threads, and as many processes of one thread each, which share nothing, take turns: the processes
+show what perfect scaling is while other programs are at work, and the threads are compared with both.
+"""
+
+import argparse
+import os
+import statistics
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+from sbs_sim import Aircraft, Case, simulate_batch, trim
+from sbs_sim.model.wind import Wind
+
+
+def fly(first: int, count: int, duration: float, threads: int) -> int:
+    """Fly gust flights with the seeds from `first` on; how many there were."""
+    aircraft = Aircraft.load("sbs")
+    point = trim(aircraft, airspeed=15.0)
+    cases = [
+        Case(aircraft, point, wind=Wind(turbulence_intensity=(1.5, 1.5, 1.5), turbulence_seed=first + i))
+        for i in range(count)
+    ]
+    batch = simulate_batch(cases, duration, every=10, outputs=["state"], workers=threads)
+    return len(batch.cases)
+
+
+def main() -> None:
+    """Print flights per second and how near the scaling comes to the number of cores."""
+    cores = len(os.sched_getaffinity(0))
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--flights", type=int, default=8, help="of each thread (default: 8)")
+    parser.add_argument("--duration", type=float, default=5.0, help="of a flight [s] (default: 5)")
+    parser.add_argument("--rounds", type=int, default=9, help="of which medians are taken (default: 9)")
+    parser.add_argument("--threads", type=int, default=cores, help=f"beside one (default: {cores}, the cores)")
+    given = parser.parse_args()
+    many, flights = given.threads, given.flights
+    with ProcessPoolExecutor(many, get_context("spawn")) as pool:
+
+        def processes() -> int:
+            parts = [pool.submit(fly, i * flights, flights, given.duration, 1) for i in range(many)]
+            return sum(part.result() for part in parts)
+
+        ways: dict[str, Callable[[], int]] = {
+            "1 thread": lambda: fly(0, flights, given.duration, 1),
+            f"{many} threads": lambda: fly(0, many * flights, given.duration, many),
+            f"{many} processes": processes,
+        }
+        rates = measured(ways, given.rounds)
+    print(f"flights of {given.duration:g} s, medians of {given.rounds} rounds, load {os.getloadavg()[0]:.2f}")
+    for name, found in rates.items():
+        rate = statistics.median(found)
+        print(f"{name}: {rate:.2f} flights/s, {rate * given.duration:.1f} x real time")
+    one, threads, apart = rates.values()
+    for name, perfect in ((f"{many} x 1 thread", [many * rate for rate in one]), (f"{many} processes", apart)):
+        shares = [100 * rate / best for rate, best in zip(threads, perfect, strict=True)]
+        print(f"{many} threads, of {name}: {statistics.median(shares):.1f} %, best round {max(shares):.1f} %")
+
+
+def measured(ways: dict[str, Callable[[], int]], rounds: int) -> dict[str, list[float]]:
+    """Flights per second of every way, round by round."""
+    rates: dict[str, list[float]] = {name: [] for name in ways}
+    for i in range(rounds + 1):
+        for name, work in ways.items():
+            start = time.perf_counter()
+            count = work()
+            if i > 0:  # the first round loads and compiles
+                rates[name].append(count / (time.perf_counter() - start))
+    return rates
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,150 @@
+"""Monte Carlo: many flights of an aircraft through turbulence, each with its own gusts and scattered parameters."""
+
+import csv
+import io
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft_values import unit_of
+from sbs_sim.batch import Batch, Case, percentiles
+from sbs_sim.errors import BatchError
+from sbs_sim.model import state as S
+from sbs_sim.model.frames import quaternion_to_euler
+from sbs_sim.model.wind import Wind
+
+Array = NDArray[np.float64]
+
+OUTPUTS = ("state", "power")  # of a batch, that `quantities` needs
+SHARES = (5.0, 25.0, 50.0, 75.0, 95.0)  # per cent
+LEAST_AIRSPEED = 5.0  # m/s, at which the field passes in hover
+
+
+def gust_cases(
+    aircraft: Aircraft,
+    flights: int,
+    condition: Mapping[str, float],
+    *,
+    turbulence: float,
+    length: float = 50.0,
+    seed: int = 0,
+    spread: Mapping[str, float] | None = None,
+) -> list[Case]:
+    """Flights with the controls of their trims, each through Dryden turbulence of its own.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    flights : int
+    condition : mapping
+        Arguments of `sbs_sim.trim`, with which each flight's aircraft is trimmed.
+    turbulence : float
+        Standard deviation of each component [m/s].
+    length : float
+        Dryden length scale [m]. The field passes with the airspeed, with 5 m/s at least.
+    seed : int
+        Flight i is the same for the same seed, whatever the number of flights.
+    spread : mapping of str to float, optional
+        Paths for `Aircraft.with_value`, and standard deviations relative to the value there: that of a flight is
+        normally distributed around it.
+
+    Returns
+    -------
+    list of Case
+
+    Raises
+    ------
+    BatchError
+        A number out of range, or a value that cannot be scattered.
+    SbsError
+        A path that does not exist, or turbulence out of range.
+    """
+    if isinstance(flights, bool) or not isinstance(flights, int) or flights < 1:
+        raise BatchError(f"flights = {flights!r}: allowed are whole numbers from 1")
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**64:
+        raise BatchError(f"seed = {seed!r}: allowed are whole numbers from 0 to 2^64 - 1")
+    centres = {path: (_centre(aircraft, path), _checked_share(path, share)) for path, share in (spread or {}).items()}
+    cases = []
+    for i in range(flights):
+        random = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, i])))
+        wind = Wind(
+            turbulence_intensity=(turbulence, turbulence, turbulence),
+            turbulence_length=length,
+            turbulence_airspeed=max(abs(condition.get("airspeed", 0.0)), LEAST_AIRSPEED),
+            turbulence_direction=condition.get("sideslip", 0.0),
+            turbulence_seed=int(random.integers(2**63)),
+        )
+        changes = {path: mean * (1.0 + share * random.standard_normal()) for path, (mean, share) in centres.items()}
+        cases.append(Case(aircraft, dict(condition), wind=wind, changes=changes))
+    return cases
+
+
+def _centre(aircraft: Aircraft, path: str) -> float:
+    """Value of the file around which a path's values lie."""
+    found = aircraft.value(path)
+    every = found if isinstance(found, list) else [found]
+    if any(isinstance(value, bool) or not isinstance(value, int | float) for value in every) or len(set(every)) != 1:
+        raise BatchError(f"spread of {path}: its value {found!r} must be one number, or the same one for every rotor")
+    if every[0] == 0.0:
+        raise BatchError(f"spread of {path}: it is relative to its value, which is zero")
+    return float(every[0])
+
+
+def _checked_share(path: str, share: float) -> float:
+    if isinstance(share, bool) or not isinstance(share, int | float) or not 0.0 <= share <= 1.0:
+        raise BatchError(f"spread of {path} = {share!r}: allowed are 0 to 1")
+    return float(share)
+
+
+def quantities(batch: Batch) -> dict[str, Array]:
+    """What a person wants to see of flights, by name with its unit, angles in degrees; shape (n_flights, n_rows)."""
+    x = batch["north"], batch["east"], -batch["down"]
+    places = dict(zip(("north [m]", "east [m]", "height [m]"), x, strict=True))
+    speeds = {f"{name} [m/s]": batch[name] for name in "uvw"}
+    rates = {f"{name} [deg/s]": np.degrees(batch[name]) for name in "pqr"}
+    attitude = batch["state"][:, :, S.ATTITUDE : S.ATTITUDE + 4]
+    flown = ~np.isnan(attitude[:, :, 0])
+    angles = np.full((*flown.shape, 3), math.nan)
+    angles[flown] = [quaternion_to_euler(quaternion) for quaternion in attitude[flown]]
+    angles[:, :, ::2] = np.unwrap(angles[:, :, ::2], axis=1)  # yaw and roll, over 180 deg
+    named = {f"{name} [deg]": np.degrees(angles[:, :, k]) for name, k in (("roll", 2), ("pitch", 1), ("yaw", 0))}
+    power = np.where(flown, np.nansum(batch["power"], axis=2), math.nan)
+    return {**places, **named, **speeds, **rates, "power [W]": power}
+
+
+def batch_to_dict(batch: Batch) -> dict[str, Any]:
+    """Flights with what was scattered, and the percentiles over time, for JSON."""
+    flights = [
+        {"seed": case.wind.turbulence_seed, "changes": dict(case.changes), "error": error}
+        for case, error in zip(batch.cases, batch.errors, strict=True)
+    ]
+    found = {name: percentiles(values, SHARES) for name, values in quantities(batch).items()}
+    return {
+        "aircraft": batch.cases[0].aircraft.name,
+        "parameter_hash": batch.cases[0].aircraft.parameter_hash,
+        "flights": flights,
+        "time": batch.time,
+        "shares": SHARES,
+        "percentiles": found,
+    }
+
+
+def batch_to_csv(batch: Batch) -> str:
+    """Table of flights: seed, what was scattered, the last that was flown of every quantity, and the error."""
+    flown = quantities(batch)
+    ends = (~np.isnan(batch["state"]).all(axis=2)).sum(axis=1) - 1
+    paths = list(batch.cases[0].changes)
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    units = [f"{path} [{unit_of(path)}]" if unit_of(path) else path for path in paths]
+    writer.writerow(["flight", "seed", *units, "time [s]", *flown, "error"])
+    for i, (case, end) in enumerate(zip(batch.cases, ends, strict=True)):
+        last = [batch.time[end], *(values[i, end] for values in flown.values())] if end >= 0 else []
+        numbers = [*(case.changes[path] for path in paths), *last]
+        cells = [repr(float(number)) for number in numbers] + [""] * (1 + len(flown) - len(last))
+        writer.writerow([i, case.wind.turbulence_seed, *cells, batch.errors[i] or ""])
+    return file.getvalue()

@@ -1,0 +1,285 @@
+"""Many flights at once, on all cores or on a cluster: other aircraft, starts, controls and winds in one call.
+
+Every flight is what `simulate` would give, to the last bit, whatever number of threads or workers fly them.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.trim import TrimPoint, trim
+from sbs_sim.errors import BatchError, SbsError
+from sbs_sim.model import state as S
+from sbs_sim.model.wind import Wind
+from sbs_sim.parallel import checked_workers, compute
+from sbs_sim.simulation import Commands, fly_commands
+
+if TYPE_CHECKING:
+    import distributed
+
+Array = NDArray[np.float64]
+
+LOADED = ("acceleration", "thrust", "torque", "power")  # which take a derivative at every row
+GROUPS = ("state", "controls", "swashplate", *LOADED)
+FIDELITY = ("lead_lag", "cyclic_inflow")
+CANCELLED = "cancelled"
+MEMORY = 4e9  # bytes
+
+
+@dataclass(frozen=True)
+class Case:
+    """One flight of a batch.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    start : TrimPoint, ndarray of shape (size,), or mapping
+        See `sbs_sim.simulate`; a mapping holds arguments of `sbs_sim.trim`, {"airspeed": 15.0}, with which the
+        aircraft of this flight is trimmed.
+    controls : array_like or callable, optional
+        See `sbs_sim.simulate`; those of the trim if not given.
+    wind : Wind
+    changes : mapping
+        Values for `Aircraft.with_value` by path, with which this aircraft differs: {"body.mass": 22.0}. They are
+        made where the flight is flown. They must leave the number of rotors and blades alone.
+    """
+
+    aircraft: Aircraft
+    start: TrimPoint | ArrayLike | Mapping[str, float]
+    controls: Commands | None = None
+    wind: Wind = field(default_factory=Wind)
+    changes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Flights of a batch.
+
+    Attributes
+    ----------
+    cases : tuple of Case
+    time : ndarray, shape (n_rows,)
+        [s]
+    state_names : tuple of str
+        Of the columns of "state": those of all aircraft, in the order in which they appear.
+    histories : dict of str to ndarray
+        What was asked for, by name, each with the shape (n_flights, n_rows, ...); see `simulate_batch`.
+    errors : tuple of str or None
+        Of each flight, why it ended early or did not begin, in one line; None for a whole flight. "cancelled" for
+        what was not begun.
+    """
+
+    cases: tuple[Case, ...]
+    time: Array
+    state_names: tuple[str, ...]
+    histories: dict[str, Array] = field(repr=False)
+    errors: tuple[str | None, ...]
+
+    @cached_property
+    def failed(self) -> tuple[int, ...]:
+        """Numbers of the flights with an error."""
+        return tuple(i for i, error in enumerate(self.errors) if error is not None)
+
+    def __getitem__(self, name: str) -> Array:
+        """History of a name, shape (n_flights, n_rows, ...); NaN after the end of a flight.
+
+        Raises
+        ------
+        KeyError
+            It was not asked for; the message lists what there is.
+        """
+        if name in self.histories:
+            return self.histories[name]
+        if "state" in self.histories and name in self.state_names:
+            return self.histories["state"][:, :, self.state_names.index(name)]
+        known = [*self.histories, *(self.state_names if "state" in self.histories else ())]
+        raise KeyError(f"no {name!r}: there are {', '.join(known)}")
+
+    def percentiles(self, name: str, shares: Sequence[float] = (5.0, 25.0, 50.0, 75.0, 95.0)) -> Array:
+        """Percentiles over the flights that are in the air, shape (n_shares, n_rows, ...); NaN where there is none."""
+        return percentiles(self[name], shares)
+
+
+def percentiles(values: Array, shares: Sequence[float]) -> Array:
+    """Percentiles of histories (n_flights, n_rows, ...) over the flights in the air, shape (n_shares, n_rows, ...)."""
+    result = np.full((len(shares), *values.shape[1:]), math.nan)
+    flying = ~np.isnan(values).all(axis=0)
+    result[:, flying] = np.nanpercentile(values[:, flying], shares, axis=0)
+    return result
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What all flights of a batch have in common."""
+
+    duration: float
+    every: int
+    outputs: tuple[str, ...]
+    options: dict[str, Any]
+
+
+def simulate_batch(
+    cases: Sequence[Case],
+    duration: float,
+    *,
+    every: int = 1,
+    outputs: Sequence[str] = GROUPS,
+    tick: float = 0.01,
+    workers: int | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    dask: "str | distributed.Client | None" = None,
+    memory: float = MEMORY,
+    **options: Any,
+) -> Batch:
+    """Fly many flights at once.
+
+    Parameters
+    ----------
+    cases : sequence of Case, length n_flights
+    duration : float
+        Of each flight [s], rounded to whole ticks.
+    every : int
+        Ticks from one row of the histories to the next: n_rows = n_ticks // every + 1. The rows are every so many of
+        those of `sbs_sim.simulate`.
+    outputs : sequence of str
+        What to keep of "state" (n_flights, n_rows, n_states), "controls" (..., 4), "swashplate" (..., n_rotors, 3),
+        "acceleration" (..., 3), "thrust", "torque", "power" (..., n_rotors), and of single states by their names
+        (n_flights, n_rows). The four loads and accelerations take a derivative for every row. Aircraft with fewer
+        rotors or other states have NaN in their places.
+    tick, **options
+        See `sbs_sim.simulate`: azimuth_step, lead_lag, cyclic_inflow, method.
+    workers : int, optional
+        Number of threads, one for each core if not given. The results are the same for any number.
+    progress : callable, optional
+        Called with the number of a flight, the number of flights done and that of all, in the calling thread, as
+        each ends.
+    cancelled : callable, optional
+        Asked several times a second; after a True no further flight is begun, and the rest has the error "cancelled".
+    dask : str or distributed.Client, optional
+        See `sbs_sim.sweep`.
+    memory : float
+        What the histories may take [bytes]. They are all that grows with the number of flights.
+
+    Returns
+    -------
+    Batch
+        Also of flights that fail, with their errors; they disturb no others.
+
+    Raises
+    ------
+    BatchError
+        No flights, an unknown output, a value that is out of range, histories that need more memory: naming it.
+    ClusterError
+        See `sbs_sim.sweep`.
+    """
+    plan = _plan(cases, duration, every, outputs, {"tick": tick, **options})
+    count = checked_workers(workers, dask, BatchError)
+    rows = round(duration / tick) // every + 1
+    names = tuple(dict.fromkeys(name for case in cases for name in case.aircraft.layout.names))
+    histories = _memory(cases, plan.outputs, rows, names, memory)
+    errors: list[str | None] = [CANCELLED] * len(cases)
+    done = itertools.count(1)
+
+    def keep(i: int, result: tuple[dict[str, Array], str | None]) -> None:
+        flown, errors[i] = result
+        _fill(histories, i, flown, cases[i].aircraft.layout.names, names)
+        if progress is not None:
+            progress(i, next(done), len(cases))
+
+    calls = [(case.aircraft, case.start, case.controls, case.wind, dict(case.changes), plan) for case in cases]
+    compute(_fly, calls, keep, workers=count, cancelled=cancelled, dask=dask)
+    return Batch(tuple(cases), np.multiply(np.arange(rows) * every, tick, dtype=float), names, histories, tuple(errors))
+
+
+def _plan(cases: Sequence[Case], duration: float, every: int, outputs: Sequence[str], options: dict[str, Any]) -> Plan:
+    """What the flights have in common, checked as far as it can be without an aircraft."""
+    if not cases:
+        raise BatchError("cases: allowed is at least one flight")
+    if not 0.0 <= duration <= 1e6:
+        raise BatchError(f"duration = {duration}: allowed are 0 to 1e+06 s")
+    if not 1e-4 <= options["tick"] <= 1.0:
+        raise BatchError(f"tick = {options['tick']}: allowed are 0.0001 to 1 s")
+    if isinstance(every, bool) or not isinstance(every, int) or every < 1:
+        raise BatchError(f"every = {every!r}: allowed are whole numbers from 1")
+    unknown = [name for name in options if name not in ("tick", "azimuth_step", "method", *FIDELITY)]
+    if unknown:
+        raise BatchError(f"{unknown[0]}: unknown option, allowed are tick, azimuth_step, method, {', '.join(FIDELITY)}")
+    known = {*GROUPS, *(name for case in cases for name in case.aircraft.layout.names)}
+    for name in outputs:
+        if name not in known:
+            raise BatchError(f"outputs: {name!r}: allowed are {', '.join(GROUPS)} and names of states")
+    return Plan(duration, every, tuple(dict.fromkeys(outputs)), options)
+
+
+def _memory(
+    cases: Sequence[Case], outputs: Sequence[str], rows: int, names: tuple[str, ...], memory: float
+) -> dict[str, Array]:
+    """Histories of nothing but NaN."""
+    rotors = max(len(case.aircraft.rotors) for case in cases)
+    sizes = {
+        "state": (len(names),),
+        "controls": (len(S.CONTROL_NAMES),),
+        "swashplate": (rotors, 3),
+        "acceleration": (3,),
+        **dict.fromkeys(("thrust", "torque", "power"), (rotors,)),
+    }
+    shapes = {name: (len(cases), rows, *sizes.get(name, ())) for name in outputs}
+    need = 8.0 * sum(math.prod(shape) for shape in shapes.values())
+    if need > memory:
+        raise BatchError(
+            f"the histories of {len(cases)} flights with {rows} rows take {need / 1e9:.3g} GB: allowed by memory are"
+            f" {memory / 1e9:.3g} GB; choose fewer outputs or a larger every"
+        )
+    return {name: np.full(shape, np.nan) for name, shape in shapes.items()}
+
+
+def _fill(
+    histories: dict[str, Array], i: int, flown: dict[str, Array], own: tuple[str, ...], names: tuple[str, ...]
+) -> None:
+    """Write down a flight, as far as it went."""
+    places = [names.index(name) for name in own]
+    for name, values in flown.items():
+        target = histories[name][i, : len(values)]
+        if name == "state":
+            target[:, places] = values
+        else:
+            target[(slice(None), *map(slice, values.shape[1:]))] = values
+
+
+def _fly(
+    aircraft: Aircraft,
+    start: TrimPoint | ArrayLike | Mapping[str, float],
+    controls: Commands | None,
+    wind: Wind,
+    changes: dict[str, Any],
+    plan: Plan,
+) -> tuple[dict[str, Array], str | None]:
+    """What is asked for of one flight, and its error."""
+    try:
+        layout = aircraft.layout
+        for path, value in changes.items():
+            aircraft = aircraft.with_value(path, value)
+        if aircraft.layout != layout:
+            raise BatchError(f"changes = {changes}: allowed are those that leave the states as they are")
+        if isinstance(start, Mapping):
+            fidelity = {name: plan.options[name] for name in FIDELITY if name in plan.options}
+            start = trim(aircraft, **{**fidelity, **start})
+        if controls is None:
+            if not isinstance(start, TrimPoint):
+                raise BatchError("controls: needed where the start is a state")
+            controls = start.controls
+        loaded = any(name in LOADED for name in plan.outputs)
+        flown, fault = fly_commands(
+            aircraft, start, controls, plan.duration, every=plan.every, loaded=loaded, wind=wind, **plan.options
+        )
+    except SbsError as error:
+        return {}, str(error)
+    return {name: flown[name] for name in plan.outputs if name in flown}, str(fault) if fault else None

@@ -1,0 +1,127 @@
+"""`batch`: Monte Carlo flights through turbulence, as a table of percentiles, a plot and files."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+from sbs_sim.commands.common import (
+    add_flight_arguments,
+    add_worker_arguments,
+    aircraft,
+    assignment,
+    execute,
+    fixed,
+    flight,
+    print_table,
+    progress_bar,
+)
+from sbs_sim.errors import BatchError
+
+if TYPE_CHECKING:
+    from sbs_sim.batch import Batch
+
+MOST_FLIGHTS = 1_000_000
+LISTED = 10  # flights that ended early, with their reasons
+
+
+def main() -> int:
+    """Executable `batch`."""
+    return execute(_parser(), _work)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="batch",
+        description="Fly many flights through turbulence, hands off: each is trimmed, keeps the controls of its trim,"
+        " and has gusts of its own. On all cores or on a cluster.",
+    )
+    group = parser.add_argument_group("flights")
+    group.add_argument("--flights", type=int, default=1000, metavar="N", help="how many (default: 1000)")
+    group.add_argument("--duration", type=float, default=3.0, metavar="X", help="of each [s] (default: 3)")
+    group.add_argument(
+        "--turbulence", type=float, default=1.5, metavar="X", help="standard deviation of the air [m/s] (default: 1.5)"
+    )
+    group.add_argument("--length", type=float, default=50.0, metavar="X", help="Dryden length scale [m] (default: 50)")
+    group.add_argument("--seed", type=int, default=0, metavar="N", help="of all chance (default: 0)")
+    group.add_argument(
+        "--spread",
+        action="append",
+        default=[],
+        type=assignment,
+        metavar="PATH=SHARE",
+        help="scatter a value of the aircraft file: body.mass=0.05 with a standard deviation of 5 %%; may be given"
+        " several times",
+    )
+    add_flight_arguments(parser)
+    group = parser.add_argument_group("work and output")
+    add_worker_arguments(group)
+    group.add_argument("--every", type=float, default=0.1, metavar="X", help="time between rows [s] (default: 0.1)")
+    group.add_argument("--out", metavar="DIR", help="write a plot as PNG and SVG into this folder")
+    group.add_argument("--csv", metavar="FILE", help="write a table of flights")
+    group.add_argument("--json", metavar="FILE", help="write all flights' values and the percentiles over time")
+    return parser
+
+
+def _work(arguments: argparse.Namespace) -> None:
+    from sbs_sim.analysis.export import check_target, to_json, write
+    from sbs_sim.analysis.monte_carlo import OUTPUTS, batch_to_csv, batch_to_dict, gust_cases
+    from sbs_sim.batch import simulate_batch
+
+    check_target(arguments.csv)
+    check_target(arguments.json)
+    if not 1 <= arguments.flights <= MOST_FLIGHTS:
+        raise BatchError(f"--flights {arguments.flights}: allowed are 1 to {MOST_FLIGHTS}")
+    if not 0.01 <= arguments.every <= 1e6:
+        raise BatchError(f"--every {arguments.every:g}: allowed are 0.01 to 1e+06 s")
+    condition = flight(arguments)
+    fidelity = {name: condition.pop(name) for name in ("lead_lag", "cyclic_inflow")}
+    cases = gust_cases(
+        aircraft(arguments),
+        arguments.flights,
+        condition,
+        turbulence=arguments.turbulence,
+        length=arguments.length,
+        seed=arguments.seed,
+        spread=dict(arguments.spread),
+    )
+    with progress_bar(len(cases), " flights") as progress:
+        batch = simulate_batch(
+            cases,
+            arguments.duration,
+            every=round(100 * arguments.every),
+            outputs=OUTPUTS,
+            workers=arguments.workers,
+            dask=arguments.dask,
+            progress=progress,
+            **fidelity,
+        )
+    _print_batch(batch)
+    if arguments.csv:
+        write(arguments.csv, batch_to_csv(batch))
+    if arguments.json:
+        write(arguments.json, to_json(batch_to_dict(batch)))
+    if arguments.out:
+        from sbs_sim.analysis.monte_carlo_plots import batch_figure
+        from sbs_sim.analysis.sweep_plots import save_figures
+
+        for path in save_figures({"batch": batch_figure(batch)}, arguments.out):
+            print(f"written: {path}")
+    if len(batch.failed) == len(batch.cases):
+        raise BatchError("no flight came to its end")
+
+
+def _print_batch(batch: "Batch") -> None:
+    """Percentiles at the start and at the end, and the flights that ended before."""
+    from sbs_sim.analysis.monte_carlo import SHARES, quantities
+    from sbs_sim.batch import percentiles
+
+    whole = len(batch.cases) - len(batch.failed)
+    print(f"{len(batch.cases)} flights of {batch.cases[0].aircraft.name}, {whole} of them over {batch.time[-1]:g} s")
+    rows = []
+    for name, values in quantities(batch).items():
+        found = percentiles(values, SHARES)
+        rows.append([name, *(fixed(value, 3) for value in (found[2, 0], *found[:, -1]))])
+    print_table(["", "start, 50 %", *(f"end, {share:g} %" for share in SHARES)], rows)
+    for i in batch.failed[:LISTED]:
+        print(f"flight {i} (seed {batch.cases[i].wind.turbulence_seed}): {batch.errors[i]}")
+    if len(batch.failed) > LISTED:
+        print(f"and {len(batch.failed) - LISTED} more flights that ended early")

@@ -1,0 +1,71 @@
+"""Many ticks in one call of compiled code, so that flights side by side do not wait for Python."""
+
+from sbs_sim.model.kernel import entry, kernel
+
+
+@entry
+def fly(
+    advance, derivative, p, x, psi0, step, steps, h, method, bounds, work, swash, winds, ticks, offset, every, loaded,
+    azimuths, air, states, forces, loads, slope,
+):  # fmt: skip
+    """Fly ticks one after another, and write down the first of every `every` ones.
+
+    Parameters
+    ----------
+    advance, derivative : Address
+        Of the entries `advance` and `derivative`: the machine code with which flights tick by tick are flown.
+    p, x, psi0, steps, h, method, bounds, work :
+        See `advance`; x is overwritten.
+    step : int
+        Number of the step at the start.
+    swash : ndarray, shape (ticks, n_rotors, 3), or one more
+        Swashplate angles of each tick [rad]; after the last tick of a flight they are those it ends with.
+    winds : ndarray, shape (len(swash) or more, WIND_SIZE)
+        Air of each tick.
+    ticks : int
+        How many to fly.
+    offset : int
+        Ticks from the start until one is to be written down.
+    every : int
+    loaded : bool
+        True writes down forces and loads too, which takes one more derivative.
+    azimuths : ndarray, shape (rows, n_rotors)
+        [rad]
+    air : ndarray, shape (rows, 3)
+        Velocity of the air at the times that are written down, NED [m/s].
+    states, forces, loads : ndarray, shapes (rows, size), (rows, 3), (rows, n_rotors, LOAD_SIZE)
+        Outputs: state, specific force of the c.g. [m/s^2], see `Work`.
+    slope : ndarray, shape (size,)
+        Memory.
+
+    Returns
+    -------
+    step : int
+        Number of the last good step.
+    culprit : int
+        Index of the state that would leave the plausible, -1 if none.
+    """
+    row = 0
+    for i in range(swash.shape[0]):
+        if i == offset + row * every:
+            _copy(x, states[row])
+            if loaded:
+                derivative(p, x, swash[i], azimuths[row], air[row], work, slope)
+                _copy(work.vector[:3], forces[row])
+                for j in range(loads.shape[1]):
+                    _copy(work.loads[j], loads[row, j])
+            row += 1
+        if i == ticks:
+            break
+        done, culprit = advance(p, x, swash[i], psi0, step, steps, h, winds[i], method, bounds, work)
+        step += done
+        if culprit >= 0:
+            return step, culprit
+    return step, -1
+
+
+@kernel
+def _copy(source, target):
+    """Copy numbers one by one: a slice would be allocated."""
+    for i in range(source.size):
+        target[i] = source[i]

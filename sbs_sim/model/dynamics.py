@@ -17,7 +17,7 @@ from sbs_sim.model.frames import cross, quaternion_rates, rotation_rows
 from sbs_sim.model.fuselage import plate_drag
 from sbs_sim.model.inflow import inflow_rates
 from sbs_sim.model.kernel import entry, kernel
-from sbs_sim.model.multiblade import add_blade_acceleration, add_rotation_terms, blade_angle
+from sbs_sim.model.multiblade import add_block_accelerations, add_rotation_terms, blade_angle
 from sbs_sim.model.section import section_loads
 from sbs_sim.model.trigonometry import cosine_sine
 
@@ -608,16 +608,11 @@ def _rotor_rates(p, x, work, dx):
         dx[lags + i] = lead_lag * x[lag_rates + i]
         dx[lag_rates + i] = 0.0
     for j in range(p.rotor.shape[0]):
-        rotor = p.rotor[j]
         first = p.first_blade[j]
         n_blades = p.first_blade[j + 1] - first
-        omega, share = rotor[P.SPEED], rotor[P.INVERSE_BLADES]
-        for k in range(n_blades):
-            row, i = work.blade[p.first_block[j] + k // LANES], k % LANES
-            c, s = row[P.COSINE + i], row[P.SINE + i]
-            flap, lag = share * row[P.FLAP_ACCELERATION + i], share * row[P.LAG_ACCELERATION + i]
-            add_blade_acceleration(dx, flap_rates + first, n_blades, k, c, s, flap)
-            add_blade_acceleration(dx, lag_rates + first, n_blades, k, c, s, lag)
+        omega, share = p.rotor[j, P.SPEED], p.rotor[j, P.INVERSE_BLADES]
+        for block in range(p.first_block[j], p.first_block[j + 1]):
+            add_block_accelerations(dx, flap_rates + first, lag_rates + first, n_blades, work.blade[block], share)
         add_rotation_terms(x, dx, flaps + first, flap_rates + first, n_blades, omega, 1.0)
         add_rotation_terms(x, dx, lags + first, lag_rates + first, n_blades, omega, 1.0 * lead_lag)
         _inflow(p, j, x, work, dx)

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.model import params as P
 from sbs_sim.model.kernel import kernel
 
+LANES = P.LANES
 Array = NDArray[np.float64]
 
 
@@ -64,20 +66,51 @@ def blade_angle(x, angles, rates, n_blades, blade, cosine, sine, speed):
 
 
 @kernel
-def add_blade_acceleration(dx, rates, n_blades, blade, cosine, sine, share):
-    """Add what one blade gives to the accelerations of the coordinates.
+def add_block_accelerations(dx, flap_rates, lag_rates, n_blades, row, share):
+    """Add what the blades of one block give to the accelerations of their rotor's coordinates.
 
-    share: acceleration of the blade [rad/s^2] over the number of blades; cosine and sine are those of its azimuth.
+    `flap_rates` and `lag_rates` are the places of the first of them in dx; row: the block's in `Work.blade`; share: 1
+    over the number of blades.
     """
-    dx[rates] += share
-    cn, sn = cosine, sine
-    for n in range(1, (n_blades - 1) // 2 + 1):
-        i = rates + 2 * n - 1
-        dx[i] -= 2.0 * share * cn
-        dx[i + 1] -= 2.0 * share * sn
-        cn, sn = cn * cosine - sn * sine, sn * cosine + cn * sine
+    flap, lag = _sums(row, P.IS_BLADE)
+    dx[flap_rates] += share * flap
+    dx[lag_rates] += share * lag
+    for i in range(LANES):
+        row[P.COS_N + i], row[P.SIN_N + i] = row[P.COSINE + i], row[P.SINE + i]
+    harmonics = (n_blades - 1) // 2
+    for n in range(1, harmonics + 1):
+        flap, lag = _sums(row, P.COS_N)
+        dx[flap_rates + 2 * n - 1] -= 2.0 * share * flap
+        dx[lag_rates + 2 * n - 1] -= 2.0 * share * lag
+        flap, lag = _sums(row, P.SIN_N)
+        dx[flap_rates + 2 * n] -= 2.0 * share * flap
+        dx[lag_rates + 2 * n] -= 2.0 * share * lag
+        if n < harmonics:
+            _next_harmonic(row)
     if n_blades % 2 == 0:
-        dx[rates + n_blades - 1] += (1.0 - 2.0 * (blade % 2)) * share
+        for i in range(LANES):
+            sign = share * row[P.IS_BLADE + i] * (1.0 - 2.0 * (i % 2))
+            dx[flap_rates + n_blades - 1] += sign * row[P.FLAP_ACCELERATION + i]
+            dx[lag_rates + n_blades - 1] += sign * row[P.LAG_ACCELERATION + i]
+
+
+@kernel
+def _sums(row, weights):
+    """Flap and lag accelerations of the blades of a block, each times a weight that stands in a row."""
+    flap = lag = 0.0
+    for i in range(LANES):
+        flap += row[weights + i] * row[P.FLAP_ACCELERATION + i]
+        lag += row[weights + i] * row[P.LAG_ACCELERATION + i]
+    return flap, lag
+
+
+@kernel
+def _next_harmonic(row):
+    """Turn the cosine and sine of n psi into those of (n + 1) psi."""
+    for i in range(LANES):
+        c, s = row[P.COS_N + i], row[P.SIN_N + i]
+        row[P.COS_N + i] = c * row[P.COSINE + i] - s * row[P.SINE + i]
+        row[P.SIN_N + i] = s * row[P.COSINE + i] + c * row[P.SINE + i]
 
 
 @kernel

@@ -145,11 +145,13 @@ class Params(NamedTuple):
     INVERSE_A2,
     FLAP_ACCELERATION,
     LAG_ACCELERATION,
-) = range(0, 28 * LANES, LANES)
-FLAP_COUPLING, LAG_COUPLING, BASE_LOAD = range(28 * LANES, 46 * LANES, 6 * LANES)  # of unit beta'', xi''; without them
-PAPER_MOMENT = 46 * LANES  # moment about the hub in the paper's reading without its inertial part, body axes
-FLAP_AXIS = 49 * LANES  # unit vector f, body axes
-BLADE_SIZE = 52 * LANES
+    COS_N,  # of a multiple of the azimuth
+    SIN_N,
+) = range(0, 30 * LANES, LANES)
+FLAP_COUPLING, LAG_COUPLING, BASE_LOAD = range(30 * LANES, 48 * LANES, 6 * LANES)  # of unit beta'', xi''; without them
+PAPER_MOMENT = 48 * LANES  # moment about the hub in the paper's reading without its inertial part, body axes
+FLAP_AXIS = 51 * LANES  # unit vector f, body axes
+BLADE_SIZE = 54 * LANES
 
 # inertia: columns of the mass, first moment and six second moments of one rotor's blades about the c.g.
 INERTIA_SIZE = 10

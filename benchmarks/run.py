@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import psutil
 from analysis_rows import analysis_rows
+from plain_ratio import plain_rows
 
 from sbs_sim import Aircraft, simulate, trim
 from sbs_sim.model import params as P
@@ -94,6 +95,7 @@ def kernel_rows() -> list[Row]:
     hover = trim(aircraft)
     elements = 3 * aircraft.options.elements * len(aircraft.rotors)
     rows = [derivative_row(aircraft, hover, "hover"), derivative_row(aircraft, forward, "10 m/s")]
+    rows += [*plain_rows(aircraft, hover, "hover"), *plain_rows(aircraft, forward, "10 m/s")]
     rows += [integration_row(aircraft, forward, degrees) for degrees in (1.0, 2.5, 5.0, 10.0)]
     seconds, note = timed(lambda: simulate(aircraft, forward, forward.controls, 1.0), 11)
     rows.append(("simulate() at 5 deg, 100 Hz", 1.0 / seconds, "x real", note))

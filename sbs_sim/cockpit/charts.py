@@ -23,7 +23,7 @@ WINDOW = 20.0  # s of simulation time that the charts show
 PERIOD = 0.04  # s of simulation time between two instants that are kept
 AXIS = "#5c6670"
 FONT = "10px sans-serif"
-HEIGHT = 112  # pixels of a chart
+HEIGHT = 100  # pixels of a chart
 LEAST_SPAN = 1e-3  # that a vertical axis covers, over the largest value: rounding is no signal
 DEGREES = 180.0 / math.pi
 
@@ -190,8 +190,9 @@ def _caption(chart: Chart, values: Array | None) -> str:
     for i, name in enumerate(chart.names):
         number = "" if values is None else f" {round(values[i], chart.digits) + 0.0:.{chart.digits}f}"
         parts.append(f'<span style="color:{COLOURS[i % len(COLOURS)]};white-space:nowrap">{name}{number}</span>')
+    style = "font:11px sans-serif;padding:2px 8px 0 8px;margin-bottom:-8px;line-height:1.3"
     return (
-        '<div style="font:11px sans-serif;padding:3px 8px 0 8px;line-height:1.35;font-variant-numeric:tabular-nums">'
+        f'<div style="{style};font-variant-numeric:tabular-nums">'
         f"<b>{chart.title}</b> [{chart.unit}]&ensp;{'&ensp;'.join(parts)}</div>"
     )
 
@@ -211,5 +212,5 @@ def _plot(server: ViserServer, chart: Chart) -> Any:
         legend={"show": False},
         cursor={"show": False},
         height=HEIGHT,
-        padding=(4, 10, 0, 0),
+        padding=(9, 10, 0, 0),
     )

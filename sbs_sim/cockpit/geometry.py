@@ -68,7 +68,7 @@ def blade_poses(rotor: Rotor, azimuth: Array, flap: Array, lag: Array) -> tuple[
 
 def blade_azimuths(rotor: Rotor, azimuth: float) -> Array:
     """Azimuth of every blade [rad], shape (blades,), of that of the first (theory.md eq. 1.4)."""
-    return azimuth + 2 * math.pi / rotor.blades * np.arange(rotor.blades)
+    return azimuth + 2 * math.pi / rotor.blades * np.arange(rotor.blades, dtype=float)
 
 
 def tip_path(rotor: Rotor, flap: Array, magnification: float, count: int) -> Array:
@@ -130,7 +130,7 @@ def size(aircraft: Aircraft) -> float:
 
 def inflow_cells(rings: int, sectors: int) -> tuple[Array, Array]:
     """Edges of rings over the radius, shape (rings + 1,), and azimuths of the middles of the sectors [rad]."""
-    return np.linspace(0.1, 1.0, rings + 1), 2 * math.pi / sectors * np.arange(sectors)
+    return np.linspace(0.1, 1.0, rings + 1), 2 * math.pi / sectors * np.arange(sectors, dtype=float)
 
 
 def inflow_velocity(rotor: Rotor, inflow: Array, radius: Array, azimuth: Array) -> Array:

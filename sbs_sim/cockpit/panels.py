@@ -29,6 +29,7 @@ HINTS = (
 # One key for less and one for more of each control; they lie together, apart from those that move the camera.
 KEYS = (("H", "Y"), ("J", "L"), ("K", "I"), ("O", "U"))
 LIVE = "live"
+PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
 
 
 class Pilot(Protocol):
@@ -57,6 +58,22 @@ class Pilot(Protocol):
 
     def linearize(self, condition: TrimCondition) -> Answer:
         """Linearize about a condition; the model comes by itself."""
+
+
+def _by_user(act: Callable[[], None]) -> Callable[[Any], None]:
+    """Callback that acts on what a user did, not on values that the program sets."""
+
+    def callback(event: Any) -> None:
+        if event.client is not None:
+            act()
+
+    return callback
+
+
+def _notify(server: ViserServer, title: str, text: str) -> None:
+    """Tell everyone who looks at the page what was refused."""
+    for client in server.get_clients().values():
+        client.add_notification(title, text, color="orange", auto_close_seconds=8.0)
 
 
 class FlyPanel:
@@ -89,10 +106,10 @@ class FlyPanel:
 
     def _add_clock(self) -> None:
         gui = self._server.gui
-        self._clock = gui.add_button_group("Flight", ("Pause", "Step", "Reset"))
+        self._clock = gui.add_button_group("Flight", (PAUSE, STEP, RESET))
         self._clock.on_click(lambda event: self._on_clock(event.target.value))
         self._pace = gui.add_dropdown("Real time ×", PACES, initial_value="1")
-        self._pace.on_update(lambda event: event.client and self._on_pace())
+        self._pace.on_update(_by_user(self._on_pace))
 
     def _add_controls(self) -> None:
         gui = self._server.gui
@@ -101,10 +118,10 @@ class FlyPanel:
             for i, label in enumerate(LABELS):
                 low, high = self._ranges[i]
                 slider = gui.add_slider(label, low, high, SLIDER_STEP, float(np.clip(0.0, low, high)), hint=HINTS[i])
-                slider.on_update(lambda event: event.client and self._on_slider())
+                slider.on_update(_by_user(self._on_slider))
                 self._sliders.append(slider)
             self._hold = gui.add_checkbox("Hold", False, hint="the page keeps commanding; untick to let others fly")
-            self._hold.on_update(lambda event: event.client and self._on_hold())
+            self._hold.on_update(_by_user(self._on_hold))
 
     def _add_reset(self) -> None:
         gui = self._server.gui
@@ -133,13 +150,13 @@ class FlyPanel:
 
     def _add_keys(self) -> None:
         add = self._server.gui.add_command
-        add("Pause or go on", hotkey="space").on_trigger(lambda _: self._on_clock("Pause"))
-        add("Step", hotkey="N").on_trigger(lambda _: self._on_clock("Step"))
-        add("Reset", hotkey="R", modifier="shift").on_trigger(lambda _: self._on_clock("Reset"))
+        add("Pause or go on", hotkey="space").on_trigger(lambda _: self._on_clock(PAUSE))
+        add("Step", hotkey="N").on_trigger(lambda _: self._on_clock(STEP))
+        add("Reset", hotkey="R", modifier="shift").on_trigger(lambda _: self._on_clock(RESET))
         for i, (label, keys) in enumerate(zip(LABELS, KEYS, strict=True)):
             for key, sign in zip(keys, (-1, 1), strict=True):
                 name = f"{label} {'less' if sign < 0 else 'more'}"
-                add(name, hotkey=key).on_trigger(lambda _, i=i, sign=sign: self._nudge(i, sign * KEY_STEP))  # type: ignore[misc,arg-type]
+                add(name, hotkey=key).on_trigger(lambda _, i=i, sign=sign: self._nudge(i, sign * KEY_STEP))
 
     # ----------------------------------------------------------------------------------------------------- actions
 
@@ -147,13 +164,12 @@ class FlyPanel:
         """Tell what was refused."""
         done, message = answer
         if not done:
-            for client in self._server.get_clients().values():
-                client.add_notification(f"{what} refused", message, color="orange", auto_close_seconds=8.0)
+            _notify(self._server, f"{what} refused", message)
 
     def _on_clock(self, button: str) -> None:
-        if button == "Pause":
+        if button in (PLAY, PAUSE):
             self._say(button, self._pilot.pause(not self._paused))
-        elif button == "Step":
+        elif button == STEP:
             self._say(button, self._pilot.step(1))
         else:
             self._release()
@@ -204,15 +220,15 @@ class FlyPanel:
 
     def update(self, controls: Array, playing: bool) -> None:
         """Follow the flight: the controls that are in force [rad], unless this page commands them."""
-        self._paused = not playing
-        label = "Pause" if playing else "Go on"
+        if self._paused == playing:
+            self._paused = not playing
+            self._clock.options = (PAUSE if playing else PLAY, STEP, RESET)
         if self._holding:
             return
         for slider, value in zip(self._sliders, np.degrees(controls), strict=True):
             rounded = round(float(value), 3)
             if abs(slider.value - rounded) > 0.5 * SLIDER_STEP:
                 slider.value = rounded
-        del label
 
 
 class LogPanel:
@@ -241,13 +257,13 @@ class LogPanel:
         self._paths: dict[str, Path] = {}
         gui = server.gui
         self._pick = gui.add_dropdown("Source", [*self._first, *self._names()] or ["none"])
-        self._pick.on_update(lambda event: event.client and self._on_pick())
+        self._pick.on_update(_by_user(self._on_pick))
         gui.add_button("Look for new logs").on_click(lambda _: self._refresh())
         self.playing = gui.add_checkbox("Play", True)
         self.rate = gui.add_dropdown("Speed ×", PACES[:-1], initial_value="1")
         self.place = gui.add_slider("Time [s]", 0.0, 1.0, 0.01, 0.0)
         self.moved = False
-        self.place.on_update(lambda event: event.client and self._on_place())
+        self.place.on_update(_by_user(self._on_place))
         self.message = gui.add_markdown("")
         self.enable(False)
 
@@ -265,8 +281,7 @@ class LogPanel:
         done, message = self._choose(self._paths.get(self._pick.value))
         self.message.content = message
         if not done:
-            for client in self._server.get_clients().values():
-                client.add_notification("Log refused", message, color="orange", auto_close_seconds=8.0)
+            _notify(self._server, "Log refused", message)
 
     def _on_place(self) -> None:
         self.moved = True
@@ -277,13 +292,6 @@ class LogPanel:
             handle.disabled = not there
         if there:
             self.place.min, self.place.max = beginning, max(end, beginning + 0.01)
-
-    def select(self, path: Path) -> None:
-        """Show a path as the one that is chosen."""
-        if path.name not in self._paths:
-            self._paths[path.name] = path
-        self._pick.options = (*self._first, *self._paths)
-        self._pick.value = path.name
 
 
 class ViewPanel:
@@ -310,7 +318,7 @@ class ViewPanel:
             ("trail", "Trail"),
         ):
             box = gui.add_checkbox(label, getattr(shown, field))
-            box.on_update(lambda _, field=field, box=box: setattr(shown, field, box.value))  # type: ignore[misc]
+            box.on_update(lambda _, field=field, box=box: setattr(shown, field, box.value))
         cameras = gui.add_button_group("From", tuple(CAMERAS))
         cameras.on_click(lambda event: place_camera(event.client, CAMERAS[event.target.value]))
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 
 import numpy as np
 
@@ -79,8 +80,8 @@ def readout(aircraft: Aircraft, snapshot: Snapshot, status: Status, source: str)
         ("time", f"{snapshot.time:.2f}", "s"),
         ("airspeed", f"{np.linalg.norm(ground - snapshot.wind):.2f}", "m/s"),
         ("ground speed", f"{math.hypot(ground[0], ground[1]):.2f}", "m/s"),
-        ("climb", f"{-ground[2] + 0.0:+.2f}", "m/s"),
-        ("height", f"{-state[S.POSITION + 2] + 0.0:.2f}", "m"),
+        ("climb", _fixed(-ground[2]), "m/s"),
+        ("height", _fixed(-state[S.POSITION + 2]), "m"),
         ("heading", f"{math.degrees(yaw) % 360:.1f}", "deg"),
         ("thrust", f"{snapshot.loads[:, P.THRUST].sum():.1f}", "N"),
         ("power", f"{power:.0f}", "W"),
@@ -91,20 +92,26 @@ def readout(aircraft: Aircraft, snapshot: Snapshot, status: Status, source: str)
         for name, value, unit in rows
     )
     return (
-        '<div style="font:12px sans-serif;padding:6px 10px 2px 10px;font-variant-numeric:tabular-nums">'
+        '<div style="font:12px sans-serif;padding:6px 10px 10px 10px;font-variant-numeric:tabular-nums">'
         f'<div style="display:flex;gap:12px;align-items:center">{_horizon(pitch, roll)}'
         f'<table style="border-collapse:collapse;line-height:1.28">{cells}</table></div>'
         f"{_state_line(status, source)}</div>"
     )
 
 
+def _fixed(value: float) -> str:
+    """Number with two decimals, without a minus before zeros."""
+    return f"{round(float(value), 2) + 0.0:.2f}"
+
+
 def _horizon(pitch: float, roll: float) -> str:
-    """Artificial horizon: sky, earth, a pitch ladder in steps of 10 deg, the aircraft's wings."""
+    """Artificial horizon: sky, earth, a ladder of 10 deg of pitch, the aircraft's wings."""
     down = max(-90.0, min(90.0, math.degrees(pitch))) * PIXELS_PER_DEGREE
     ladder = "".join(
         f'<line x1="{-length}" x2="{length}" y1="{-step * PIXELS_PER_DEGREE}" y2="{-step * PIXELS_PER_DEGREE}"'
         ' stroke="white" stroke-width="1"/>'
-        for step, length in ((-20, 14), (-10, 9), (10, 9), (20, 14))
+        for step in range(-80, 81, 10)
+        if step and (length := 14 if step % 20 == 0 else 9)
     )
     ticks = "".join(
         f'<line x1="0" x2="0" y1="-56" y2="-50" stroke="{MARK}" stroke-width="1" transform="rotate({angle})"/>'
@@ -124,13 +131,11 @@ def _horizon(pitch: float, roll: float) -> str:
 
 
 def _state_line(status: Status, source: str) -> str:
-    """What flies, how fast, and what is wrong."""
-    doing = "playing" if status.playing else "paused"
-    parts = [
-        f"<b>{escape(source)}</b> {doing}",
-        f"{status.real_time_factor:.2f} × real time",
-        f"{status.missed_deadlines} deadlines missed",
-    ]
-    trouble = status.fault or status.log_state
-    alarm = f'<div style="color:#D55E00">{escape(trouble)}</div>' if trouble else ""
-    return f'<div style="margin-top:4px">{" · ".join(parts)}</div>{alarm}'
+    """What flies, how fast, where it is recorded, and what is wrong."""
+    doing = f"playing, {status.real_time_factor:.2f} × real time" if status.playing else "paused"
+    late = f" · {status.missed_deadlines} deadlines missed" if status.missed_deadlines else ""
+    lines = [f"<b>{escape(source)}</b> {doing}{late}"]
+    if status.log:
+        lines.append(f'<span style="color:#5c6670">recording {escape(Path(status.log).name)}</span>')
+    lines += [f'<span style="color:#D55E00">{escape(text)}</span>' for text in (status.fault, status.log_state) if text]
+    return f'<div style="margin-top:4px;line-height:1.4">{"<br>".join(lines)}</div>'

@@ -29,12 +29,13 @@ NED_TO_VIEW = (0.0, 1.0, 0.0, 0.0)  # half turn about north
 SKY, GROUND, GRID, SECTION = (233, 240, 246), (214, 220, 212), (196, 203, 195), (160, 168, 160)
 FUSELAGE, DUCT, BLADE, FIRST_BLADE = (92, 104, 118), (150, 160, 170), (52, 60, 70), (213, 94, 0)
 THRUST, MOMENT, PATH, TRAIL = (0, 114, 178), (204, 121, 167), (0, 158, 115), (90, 100, 110)
+AMBIENT = 1.2
 FOG = (60.0, 400.0)  # m
 GRID_SIZE = 2000.0  # m
 RINGS, SECTORS, PATH_POINTS = 4, 24, 60
 TRAIL_PERIOD, TRAIL_POINTS = 0.25, 240  # s of simulation time between points
 ARROW_OF_WEIGHT = 0.5  # m, arrow of a rotor that carries its share of the weight
-ARROW_OF_MOMENT = 0.02  # m / (N m)
+ARROW_OF_MOMENT = 0.06  # m / (N m)
 LEAST_ARROW = 1e-3  # m
 # Viridis (Smith and van der Walt) at nine places: lightness grows evenly, and all people see it alike.
 COLOURS = np.array(
@@ -78,11 +79,12 @@ class Scene:
     ----------
     server : ViserServer
     aircraft : Aircraft
+    shown : Shown
+        May change at any time.
     """
 
-    def __init__(self, server: ViserServer, aircraft: Aircraft) -> None:
-        self.aircraft = aircraft
-        self.shown = Shown()
+    def __init__(self, server: ViserServer, aircraft: Aircraft, shown: Shown) -> None:
+        self.aircraft, self._shown = aircraft, shown
         self._scene = server.scene
         self._scene.add_frame("/ned", show_axes=False, wxyz=NED_TO_VIEW)
         self._earth = self._scene.add_frame("/ned/earth", show_axes=False)
@@ -95,6 +97,7 @@ class Scene:
             for j, rotor in enumerate(aircraft.rotors)
         ]
         self._trail = Trail(self._scene)
+        self.newtons_per_metre = share / ARROW_OF_WEIGHT
         induced = math.sqrt(share / (2 * aircraft.environment.air_density * math.pi * aircraft.rotors[0].radius ** 2))
         self.inflow_range = (0.0, float(math.ceil(2 * induced)))
 
@@ -112,10 +115,10 @@ class Scene:
         self._earth.position = -state[S.POSITION : S.ATTITUDE]
         for j, (nodes, rotor) in enumerate(zip(self._rotors, self.aircraft.rotors, strict=True)):
             azimuth = float(snapshot.azimuth[j]) + rotor.speed * lead
-            nodes.draw_blades(azimuth, state[layout.flap(j)], state[layout.lag(j)], self.shown)
-            nodes.draw_loads(snapshot.loads[j], self.shown)
-            nodes.draw_inflow(state[layout.inflow(j)], self.inflow_range, self.shown)
-        self._trail.draw(snapshot.time, state[S.POSITION : S.ATTITUDE], self.shown.trail)
+            nodes.draw_blades(azimuth, state[layout.flap(j)], state[layout.lag(j)], self._shown)
+            nodes.draw_loads(snapshot.loads[j], self._shown)
+            nodes.draw_inflow(state[layout.inflow(j)], self.inflow_range, self._shown)
+        self._trail.draw(snapshot.time, state[S.POSITION : S.ATTITUDE], self._shown.trail)
 
     def clear_trail(self) -> None:
         """Forget where the aircraft was."""
@@ -257,6 +260,9 @@ def _add_ground(scene: Any) -> None:
     """Sky, horizon, ground and its grid: cells of 1 m, sections of 10 m."""
     scene.set_background_image(np.full((2, 2, 3), SKY, dtype=np.uint8), format="png")
     scene.configure_fog(*FOG, color=SKY)
+    scene.configure_environment_map(None)  # its light would wash out the colours, which mean something here
+    scene.configure_default_lights(cast_shadow=False)
+    scene.add_light_ambient("/ned/ambient", intensity=AMBIENT)
     scene.add_grid(
         "/ned/earth/grid",
         GRID_SIZE,
@@ -345,7 +351,7 @@ def _add_ring(scene: Any, name: str, rotor: Rotor, hub: Array, edges: Array, azi
         batched_positions=np.zeros((len(azimuths), 3)),
         batched_colors=np.tile(COLOURS[0].astype(np.uint8), (len(azimuths), 1)),
         lod="off",
-        opacity=0.55,
+        opacity=0.75,
         side="double",
         cast_shadow=False,
         receive_shadow=False,

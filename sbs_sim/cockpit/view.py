@@ -14,13 +14,16 @@ from sbs_sim.cockpit.panels import CAMERAS, Answer, FlyPanel, LogPanel, Pilot, V
 from sbs_sim.cockpit.playback import Recording, recordings
 from sbs_sim.cockpit.poles import Pole, pole_page
 from sbs_sim.cockpit.readouts import Status, condition_here, readout
-from sbs_sim.cockpit.scene import COLOURS, Scene
+from sbs_sim.cockpit.scene import ARROW_OF_MOMENT, COLOURS, MOMENT, PATH, THRUST, Scene, Shown
 from sbs_sim.errors import SbsError
 from sbs_sim.simulation import Snapshot
 
 FRAME_PERIOD = 1.0 / 30.0  # s
 READOUT_EVERY, CHARTS_EVERY = 3, 6  # frames
 PANEL_WIDTH = 308  # pixels
+
+
+NO_MODEL = '<div style="font:12px sans-serif;padding:10px">No linear model yet: <b>Linearize here</b> makes one.</div>'
 
 
 @dataclass(frozen=True)
@@ -63,8 +66,8 @@ class View:
         self._place = 0.0
         self._lock = threading.RLock()  # callbacks of the page come in threads of their own
         self._frames = 0
-        self._drawn: Snapshot | None = None
-        self.scene = Scene(server, aircraft)
+        self._shown = Shown()
+        self._scene = Scene(server, aircraft, self._shown)
         server.initial_camera.position = CAMERAS["behind"]
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
@@ -82,25 +85,25 @@ class View:
             self._fly = FlyPanel(self._server, self._aircraft, pilot, self._here)
         with tabs.add_tab("Logs"):
             self._logs = LogPanel(self._server, lambda: recordings(folder), self.show, True)
-            self._recorded = gui.add_markdown("")
         with tabs.add_tab("View"):
-            ViewPanel(self._server, self.scene.shown)
-            gui.add_html(_legend(self.scene))
+            ViewPanel(self._server, self._shown)
+            gui.add_html(_legend(self._scene))
 
     def _add_charts(self) -> None:
         panel = self._server.gui.add_panel()
-        with panel.add_tab("Body"):
-            body = ChartColumn(self._server, body_charts(self._aircraft))
-        with panel.add_tab("Rotors"):
-            rotors = ChartColumn(self._server, rotor_charts(self._aircraft))
-        self._columns = (body, rotors)
+        self._tabs = (panel.add_tab("Body"), panel.add_tab("Rotors"))
         with panel.add_tab("Modes"):
-            self._modes = self._server.gui.add_html(
-                '<div style="font:12px sans-serif;padding:10px">No linear model yet: <b>Linearize here</b> makes one.'
-                "</div>"
-            )
+            self._modes = self._server.gui.add_html(NO_MODEL)
         panel.dock_left()
         panel.set_width(PANEL_WIDTH)
+        self._columns = self._make_columns(self._aircraft)
+
+    def _make_columns(self, aircraft: Aircraft) -> list[ChartColumn]:
+        columns = []
+        for tab, charts in zip(self._tabs, (body_charts(aircraft), rotor_charts(aircraft)), strict=True):
+            with tab:
+                columns.append(ChartColumn(self._server, charts))
+        return columns
 
     # -------------------------------------------------------------------------------------------------- what to show
 
@@ -113,7 +116,7 @@ class View:
         with self._lock:
             self._recording = recording
             self._place = recording.beginning if recording else 0.0
-            self._forget()
+            self._use(recording.aircraft if recording else self._aircraft)
             if recording is None:
                 self._logs.enable(False)
                 return True, ""
@@ -129,8 +132,18 @@ class View:
         live = self._live()
         return None if live is None else condition_here(live.snapshot)
 
+    def _use(self, aircraft: Aircraft) -> None:
+        """Draw an aircraft, from now on and without what was before."""
+        if aircraft.parameter_hash != self._scene.aircraft.parameter_hash:
+            self._scene.remove()
+            self._scene = Scene(self._server, aircraft, self._shown)
+            for column in self._columns:
+                column.remove()
+            self._columns = self._make_columns(aircraft)
+        self._forget()
+
     def _forget(self) -> None:
-        self.scene.clear_trail()
+        self._scene.clear_trail()
         for column in self._columns:
             column.history.clear()
 
@@ -158,12 +171,12 @@ class View:
 
     def _draw(self, shown: Live) -> None:
         snapshot = shown.snapshot
-        self.scene.draw(snapshot, shown.lead)
+        self._scene.draw(snapshot, shown.lead)
         for column in self._columns:
             column.history.add(snapshot)
         if self._frames % READOUT_EVERY == 0:
             source = self._aircraft.name if self._recording is None else self._recording.path.name
-            self._readout.content = readout(self._aircraft, snapshot, shown.status, source)
+            self._readout.content = readout(self._scene.aircraft, snapshot, shown.status, source)
         if self._frames % CHARTS_EVERY == 0:
             for column in self._columns:
                 column.update()
@@ -187,8 +200,19 @@ def _legend(scene: Scene) -> str:
     """Scale of the inflow's colours and of the arrows."""
     low, high = scene.inflow_range
     stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in COLOURS)
+    arrows = (
+        (THRUST, "thrust of a rotor", f"1 m is {scene.newtons_per_metre:.0f} N"),
+        (MOMENT, "moment on its hub", f"1 m is {1 / ARROW_OF_MOMENT:.0f} N m"),
+        (PATH, "tip path", "flap as magnified"),
+    )
+    lines = "".join(
+        f'<div><span style="display:inline-block;width:14px;height:3px;vertical-align:middle;background:rgb{colour}">'
+        f'</span>&ensp;{name}, <span style="color:#5c6670">{scale}</span></div>'
+        for colour, name, scale in arrows
+    )
     return (
-        '<div style="font:12px sans-serif;padding:8px 10px">Induced velocity through the disc, down [m/s]'
+        f'<div style="font:12px sans-serif;padding:8px 10px;line-height:1.5">{lines}'
+        '<div style="margin-top:6px">induced velocity down through the disc [m/s]</div>'
         f'<div style="height:10px;margin:3px 0;background:linear-gradient(to right,{stops})"></div>'
         f'<div style="display:flex;justify-content:space-between"><span>{low:g}</span>'
         f"<span>{(low + high) / 2:g}</span><span>{high:g}</span></div></div>"

@@ -34,7 +34,7 @@ from sbs_sim.cockpit.readouts import Status
 from sbs_sim.cockpit.view import FRAME_PERIOD, Live, View
 from sbs_sim.errors import SbsError
 from sbs_sim.model.state import SWASHPLATE_NAMES
-from sbs_sim.nodes.conversions import snapshot_of, to_seconds
+from sbs_sim.nodes.conversions import snapshot_of
 from sbs_sim.nodes.host import EVENT_QOS, LATCHED_QOS, Component, run
 from sbs_sim.nodes.remote_pilot import RemotePilot
 
@@ -48,6 +48,7 @@ DISCOVERY = 1.5  # s in which a simulator that flies already is found
 END_PATIENCE = 15.0  # s that a simulator may take to close its log
 START_HEIGHT = 10.0  # m above the origin, of a flight that the cockpit starts
 LONGEST_LEAD = 0.1  # s of simulation time that rotors are turned on without a message
+NICE = 5  # the flight comes before its picture
 DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG
 
 
@@ -61,11 +62,13 @@ class Cockpit(Component):
         Where the page is served.
     end : threading.Event
         Set when there is nothing to show any more.
+    pause : bool
+        Pause the flight before the page is served: nobody holds its controls yet.
     """
 
-    def __init__(self, host: str, port: int, end: threading.Event) -> None:
+    def __init__(self, host: str, port: int, end: threading.Event, pause: bool) -> None:
         super().__init__("cockpit")
-        self._place, self._end = (host, port), end
+        self._place, self._end, self._pause = (host, port), end, pause
         self._newest: dict[str, bytes] = {}
         self._arrived = 0.0
         self._swashplate: Array | None = None
@@ -76,7 +79,7 @@ class Cockpit(Component):
         self._period, self._last = 0.0, 0.0
         self.failed = False
         for name, kind in MESSAGES.items():
-            self.create_subscription(kind, name, lambda data, name=name: self._keep(name, data), NEWEST, raw=True)  # type: ignore[misc]
+            self.create_subscription(kind, name, lambda data, name=name: self._keep(name, data), NEWEST, raw=True)
         self.create_subscription(FlightEvent, "events", self._on_event, EVENT_QOS)
         self.create_subscription(LinearModel, "linear_model", self._on_model, LATCHED_QOS)
         thread = threading.Thread(target=self._show, name="drawing", daemon=True)
@@ -118,6 +121,7 @@ class Cockpit(Component):
 
     def _show(self) -> None:
         """Serve the page until the end."""
+        os.nice(NICE)  # of this thread and of those that it starts
         try:
             aircraft = self._await_aircraft()
             if aircraft is not None:
@@ -133,8 +137,10 @@ class Cockpit(Component):
 
     def _await_aircraft(self) -> Aircraft | None:
         """The aircraft that is flown, once the simulator says it."""
-        while not self._end.wait(0.1):
-            if (name := self._pilot.aircraft()) is not None:
+        while not self._end.wait(0.05):
+            if self._pause:
+                self._pause = not self._pilot.pause(True)[0]
+            elif (name := self._pilot.aircraft()) is not None:
                 return Aircraft.load(name)
         return None
 
@@ -250,7 +256,7 @@ def main(args: list[str] | None = None) -> None:
 
     def make_nodes() -> list[Component]:
         check_port(options.host, options.port)
-        cockpit = Cockpit(options.host, options.port, end)
+        cockpit = Cockpit(options.host, options.port, end, pause=not options.attach)
         made.append(cockpit)
         if not options.attach:
             _refuse_second_simulator(cockpit)

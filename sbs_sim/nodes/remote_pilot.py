@@ -36,7 +36,7 @@ SERVICES = {
 
 
 class RemotePilot:
-    """See `sbs_sim.cockpit.panels.Pilot`; the calls wait for their answers, so they do not belong into callbacks of ROS.
+    """See `sbs_sim.cockpit.panels.Pilot`. The calls wait for their answers: they do not belong into callbacks of ROS.
 
     Parameters
     ----------

@@ -163,13 +163,16 @@ class ChartColumn:
         table = self.history.table()
         if not len(table):
             return
-        end = table[-1, 0]
+        begin = max(table[0, 0], table[-1, 0] - WINDOW)
         column = 1
         for chart, caption, plot in zip(self._charts, self._captions, self._plots, strict=True):
             curves = table[:, column : column + len(chart.names)]
             column += len(chart.names)
             caption.content = _caption(chart, curves[-1])
-            plot.scales = {"x": {"time": False, "range": (end - WINDOW, end)}, "y": {"range": _range(curves, chart)}}
+            plot.scales = {
+                "x": {"time": False, "range": (begin, begin + WINDOW)},
+                "y": {"range": _range(curves, chart)},
+            }
             plot.data = (table[:, 0].copy(), *(curve.copy() for curve in curves.T))
 
     def remove(self) -> None:

@@ -65,32 +65,54 @@ def pole_figure(poles: Sequence[Pole]) -> Figure:
         figure = Figure(figsize=(3.5, 4.4), layout="constrained")
         FigureCanvasAgg(figure)
         near, wide = figure.subplots(2, 1)
-        _draw(near, [(i, pole) for i, pole in enumerate(poles, 1) if abs(pole.value) <= NEAR])
-        _draw(wide, list(enumerate(poles, 1)))
+        _draw(near, [(i, pole) for i, pole in enumerate(poles, 1) if abs(pole.value) <= NEAR], True)
+        _draw(wide, list(enumerate(poles, 1)), False)
         near.set_title(f"within {NEAR:g} rad/s", fontsize=8, loc="left")
         wide.set_title("all", fontsize=8, loc="left")
         wide.set_xlabel("real part [1/s]")
     return figure
 
 
-def _draw(axes: Axes, poles: Sequence[tuple[int, Pole]]) -> None:
+def _draw(axes: Axes, poles: Sequence[tuple[int, Pole]], with_names: bool) -> None:
+    """Crosses with their numbers, and with their names where there is room for them."""
     axes.axvline(0.0, color="#9aa3ab", linewidth=0.8)
     axes.grid(color="#e3e6e9", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.set_ylabel("imaginary part [rad/s]")
-    named: dict[tuple[float, float], list[int]] = {}
+    places: dict[tuple[float, float], list[tuple[int, Pole]]] = {}
     scale = max((abs(pole.value) for _, pole in poles), default=1.0) or 1.0
     for number, pole in poles:
         colour = UNSTABLE if pole.value.real > 0 else STABLE
         axes.plot(pole.value.real, pole.value.imag, "x", color=colour, markersize=5, markeredgewidth=1.3)
         place = (round(pole.value.real / scale, 1), round(pole.value.imag / scale, 1))
-        named.setdefault(place, []).append(number)
-    by_number = dict(poles)
-    for numbers in named.values():
-        value = np.mean([by_number[number].value for number in numbers])
-        text = ",".join(map(str, numbers))
-        axes.annotate(text, (value.real, value.imag), xytext=(4, 3), textcoords="offset points", fontsize=7)
-    axes.margins(0.12, 0.16)
+        places.setdefault(place, []).append((number, pole))
+    axes.margins(0.14, 0.18)
+    middle = sum(axes.get_xlim()) / 2
+    for together in places.values():
+        value = np.mean([pole.value for _, pole in together])
+        text = _numbers([number for number, _ in together])
+        if with_names:
+            text = "\n".join(f"{number} {pole.name}" for number, pole in reversed(together))
+        left = bool(value.real > middle)
+        axes.annotate(
+            text,
+            (value.real, value.imag),
+            xytext=(-5 if left else 5, 3),
+            ha="right" if left else "left",
+            textcoords="offset points",
+            fontsize=7,
+        )
+
+
+def _numbers(numbers: Sequence[int]) -> str:
+    """Numbers, those that follow each other as a range."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}–{run[-1]}" for run in runs)
 
 
 def _table(poles: Sequence[Pole]) -> str:

@@ -34,6 +34,7 @@ FOG = (60.0, 400.0)  # m
 GRID_SIZE = 2000.0  # m
 RINGS, SECTORS, PATH_POINTS = 4, 24, 60
 TRAIL_PERIOD, TRAIL_POINTS = 0.25, 240  # s of simulation time between points
+RESET_DISTANCE, RESET_SPEED = 0.5, 100.0  # m and m/s: what is further or faster is no flight but a reset
 ARROW_OF_WEIGHT = 0.5  # m, arrow of a rotor that carries its share of the weight
 ARROW_OF_MOMENT = 0.06  # m / (N m)
 LEAST_ARROW = 1e-3  # m
@@ -217,16 +218,20 @@ class Trail:
         self._height = scene.add_line_segments("/ned/height", nothing, TRAIL, **style)
         self._points: collections.deque[Array] = collections.deque(maxlen=TRAIL_POINTS)
         self._last = -math.inf
+        self._before: tuple[float, Array] | None = None
 
     def clear(self) -> None:
         """Forget it."""
         self._points.clear()
-        self._last = -math.inf
+        self._last, self._before = -math.inf, None
 
     def draw(self, time: float, position: Array, shown: bool) -> None:
-        """Go on to a position, NED [m]."""
-        if time < self._last:
-            self.clear()
+        """Go on to a position, NED [m]; a reset, which no flight could do, begins a new trail."""
+        if self._before is not None:
+            since, place = self._before
+            if time < since or math.dist(place, position) > RESET_DISTANCE + RESET_SPEED * (time - since):
+                self.clear()
+        self._before = (time, position.copy())
         self._height.points = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, -position[2]]]], dtype=np.float32)
         if time - self._last >= TRAIL_PERIOD:
             self._last = time

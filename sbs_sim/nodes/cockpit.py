@@ -1,208 +1,33 @@
-"""Node `cockpit`: a page in the browser that shows a flight and flies it.
+"""Executable `cockpit`: a flight in the browser.
 
-Subscribes `state`, `rotors`, `inflow`, `events`, `status`, `linear_model`; publishes `controls`; calls `pause`, `step`,
-`reset`, `set_wind`, `trim`, `linearize`, and sets the simulator's `real_time_factor`. The executable starts a simulator
-in a process of its own, so that drawing never takes the flight's time, or joins one that flies already.
+Starts a simulator in a process of its own, so that drawing never takes the flight's time, or joins one that flies
+already. What is slow to import is imported when the command line is known to be right.
 """
 
 import argparse
-import contextlib
 import ctypes
-import io
-import os
 import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
-import traceback
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-import numpy as np
 import rclpy.utilities
-from numpy.typing import NDArray
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
-from viser import ViserServer
 
-from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, LinearModel, RotorStateArray, SimulationStatus
-from sbs_sim.aircraft import Aircraft
-from sbs_sim.cockpit.poles import Pole
-from sbs_sim.cockpit.readouts import Status
-from sbs_sim.cockpit.view import FRAME_PERIOD, Live, View
 from sbs_sim.errors import SbsError
-from sbs_sim.model.state import SWASHPLATE_NAMES
-from sbs_sim.nodes.conversions import snapshot_of
-from sbs_sim.nodes.host import EVENT_QOS, LATCHED_QOS, Component, run
-from sbs_sim.nodes.remote_pilot import RemotePilot
+from sbs_sim.nodes.host import Component, run
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from sbs_sim.nodes.cockpit_node import Cockpit
 
-# Only the newest matters, and a page that falls behind must not hold up the flight.
-NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-MESSAGES = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "status": SimulationStatus}
 HOST, PORT = "127.0.0.1", 8080
 DISCOVERY = 1.5  # s in which a simulator that flies already is found
 END_PATIENCE = 15.0  # s that a simulator may take to close its log
 START_HEIGHT = 10.0  # m above the origin, of a flight that the cockpit starts
-LONGEST_LEAD = 0.1  # s of simulation time that rotors are turned on without a message
-NICE = 5  # the flight comes before its picture
 DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG
-
-
-class Cockpit(Component):
-    """See the module.
-
-    Parameters
-    ----------
-    host : str
-    port : int
-        Where the page is served.
-    end : threading.Event
-        Set when there is nothing to show any more.
-    pause : bool
-        Pause the flight before the page is served: nobody holds its controls yet.
-    """
-
-    def __init__(self, host: str, port: int, end: threading.Event, pause: bool) -> None:
-        super().__init__("cockpit")
-        self._place, self._end, self._pause = (host, port), end, pause
-        self._newest: dict[str, bytes] = {}
-        self._arrived = 0.0
-        self._swashplate: Array | None = None
-        self._wind = np.zeros(3)
-        self._model: LinearModel | None = None
-        self._pilot = RemotePilot(self)
-        self._aircraft: Aircraft | None = None
-        self._period, self._last = 0.0, 0.0
-        self.failed = False
-        for name, kind in MESSAGES.items():
-            self.create_subscription(kind, name, lambda data, name=name: self._keep(name, data), NEWEST, raw=True)
-        self.create_subscription(FlightEvent, "events", self._on_event, EVENT_QOS)
-        self.create_subscription(LinearModel, "linear_model", self._on_model, LATCHED_QOS)
-        thread = threading.Thread(target=self._show, name="drawing", daemon=True)
-        self.workers.append(thread)
-        thread.start()
-
-    # ------------------------------------------------------------------------------------------------ what comes in
-
-    def _keep(self, name: str, data: bytes) -> None:
-        """Keep a message as it came: only those that are drawn are taken apart."""
-        self._newest[name] = data
-        if name == "state":
-            self._arrived = time.monotonic()
-
-    def _on_event(self, event: FlightEvent) -> None:
-        if len(event.swashplate):
-            self._swashplate = np.array(event.swashplate).reshape(-1, len(SWASHPLATE_NAMES))
-        if event.kind in (FlightEvent.START, FlightEvent.WIND):
-            velocity = event.wind.velocity
-            self._wind = np.array([velocity.x, velocity.y, velocity.z])
-
-    def _on_model(self, model: LinearModel) -> None:
-        self._model = model
-
-    def _live(self) -> Live | None:
-        """The flight of the newest messages; None before there is one."""
-        newest = {name: deserialize_message(data, MESSAGES[name]) for name, data in dict(self._newest).items()}
-        if len(newest) < len(MESSAGES) or self._swashplate is None or self._aircraft is None:
-            return None
-        told = newest["status"]
-        snapshot = snapshot_of(
-            self._aircraft, newest["state"], newest["rotors"], newest["inflow"], self._swashplate, self._wind
-        )
-        playing = told.state == SimulationStatus.PLAYING
-        lead = min((time.monotonic() - self._arrived) * told.real_time_factor, LONGEST_LEAD) if playing else 0.0
-        return Live(snapshot, lead, _status(told))
-
-    # --------------------------------------------------------------------------------------------------- the page
-
-    def _show(self) -> None:
-        """Serve the page until the end."""
-        os.nice(NICE)  # of this thread and of those that it starts
-        try:
-            aircraft = self._await_aircraft()
-            if aircraft is not None:
-                self._draw_all(aircraft)
-        except SbsError as error:
-            print(" ".join(str(error).split()), file=sys.stderr)
-            self.failed = True
-        except Exception:
-            self.get_logger().error(f"internal error: {traceback.format_exc()}")
-            self.failed = True
-        finally:
-            self._end.set()
-
-    def _await_aircraft(self) -> Aircraft | None:
-        """The aircraft that is flown, once the simulator says it."""
-        while not self._end.wait(0.05):
-            if self._pause:
-                self._pause = not self._pilot.pause(True)[0]
-            elif (name := self._pilot.aircraft()) is not None:
-                return Aircraft.load(name)
-        return None
-
-    def _draw_all(self, aircraft: Aircraft) -> None:
-        self._aircraft = aircraft
-        host, port = self._place
-        server = serve(host, port)
-        view = View(server, aircraft, self._pilot, self._live, bags())
-        print(f"cockpit: http://{host}:{port}", flush=True)
-        before = due = time.monotonic()
-        while not self._end.is_set():
-            model, self._model = self._model, None
-            if model is not None:
-                view.show_model(*_poles(model))
-            now = time.monotonic()
-            view.draw(now - before)
-            before = now
-            due = max(due + FRAME_PERIOD, time.monotonic())
-            self._end.wait(due - time.monotonic())
-        server.stop()
-
-
-def _status(told: SimulationStatus) -> Status:
-    lost = f"{told.log_dropped} messages not recorded " if told.log_dropped else ""
-    return Status(
-        told.state == SimulationStatus.PLAYING,
-        told.real_time_factor,
-        told.missed_deadlines,
-        told.fault,
-        told.log,
-        f"{lost}{told.log_fault}".strip(),
-    )
-
-
-def _poles(model: LinearModel) -> tuple[list[Pole], str]:
-    """Poles of a linear model, and what it is about."""
-    condition = model.trim.condition
-    title = f"Linear model at {condition.airspeed:g} m/s, {model.method}"
-    return [Pole(mode.name, complex(mode.real, mode.imag)) for mode in model.modes], title
-
-
-def serve(host: str, port: int) -> ViserServer:
-    """Server of the page, which says nothing of itself."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        return ViserServer(host, port, verbose=False)
-
-
-def bags() -> Path:
-    """Folder of the logs."""
-    return Path(os.environ.get("SBS_SIM_BAGS") or "bags")
-
-
-def check_port(host: str, port: int) -> None:
-    """Raise SbsError if the page cannot be served there."""
-    try:
-        with socket.create_server((host, port)):
-            return
-    except OSError as error:
-        raise SbsError(f"cannot serve on {host}:{port}: {error.strerror}; another one: --port") from None
-
-
-# --- command line -----------------------------------------------------------------------------------------------
 
 
 class Simulator:
@@ -245,6 +70,51 @@ def _end_with_parent() -> None:
     ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGINT)
 
 
+class Start:
+    """What the command line asks for: a cockpit, and a simulator if there is to be one.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    ros_arguments : list of str
+    end : threading.Event
+        Set when there is nothing to show any more.
+    """
+
+    def __init__(self, options: argparse.Namespace, ros_arguments: list[str], end: threading.Event) -> None:
+        self._options, self._ros_arguments, self._end = options, ros_arguments, end
+        self._cockpit: Cockpit | None = None
+        self._simulator: Simulator | None = None
+
+    def nodes(self) -> list[Component]:
+        """Make everything.
+
+        Raises
+        ------
+        SbsError
+            The address is taken, or a simulator flies already.
+        """
+        host, port, attach = self._options.host, self._options.port, self._options.attach
+        check_address(host, port)
+        lookout, since = Component("cockpit_lookout"), time.monotonic()
+        from sbs_sim.nodes.cockpit_node import Cockpit  # meanwhile the lookout discovers others
+
+        try:
+            if not attach:
+                _refuse_second_simulator(lookout, since + DISCOVERY)
+                self._simulator = Simulator(self._ros_arguments, self._end)
+        finally:
+            lookout.destroy_node()
+        self._cockpit = Cockpit(host, port, self._end, pause=not attach)
+        return [self._cockpit]
+
+    def finish(self) -> int:
+        """End the simulator; the worst exit code."""
+        codes = [0 if self._simulator is None else self._simulator.stop()]
+        codes.append(int(self._cockpit is not None and self._cockpit.failed))
+        return max(codes, key=abs)
+
+
 def main(args: list[str] | None = None) -> None:
     """Serve the page until interrupted."""
     arguments = sys.argv if args is None else args
@@ -252,20 +122,18 @@ def main(args: list[str] | None = None) -> None:
     options = _parse(own)
     ros_arguments = arguments[1 + len(own) :]
     end = threading.Event()
-    made: list[Any] = []
+    start = Start(options, ros_arguments, end)
+    code = run(start.nodes, [arguments[0], *ros_arguments], end)
+    sys.exit(start.finish() or code)
 
-    def make_nodes() -> list[Component]:
-        check_port(options.host, options.port)
-        cockpit = Cockpit(options.host, options.port, end, pause=not options.attach)
-        made.append(cockpit)
-        if not options.attach:
-            _refuse_second_simulator(cockpit)
-            made.append(Simulator(ros_arguments, end))
-        return [cockpit]
 
-    code = run(make_nodes, [arguments[0], *ros_arguments], end)
-    codes = [code, *(one.stop() for one in made[1:]), int(bool(made) and made[0].failed)]
-    sys.exit(max(codes, key=abs))
+def check_address(host: str, port: int) -> None:
+    """Raise SbsError if nothing can be served there."""
+    try:
+        with socket.create_server((host, port)):
+            return
+    except OSError as error:
+        raise SbsError(f"cannot serve on {host}:{port}: {error.strerror or error}; see --host and --port") from None
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
@@ -283,12 +151,10 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     return options
 
 
-def _refuse_second_simulator(cockpit: Cockpit) -> None:
-    """Raise SbsError if one flies already where this one would publish."""
-    end = time.monotonic() + DISCOVERY
-    while time.monotonic() < end:
-        if cockpit.count_publishers("status"):
-            raise SbsError(
-                "a simulator is flying already: --attach joins it, another ROS_DOMAIN_ID keeps apart from it"
-            )
-        time.sleep(0.05)
+def _refuse_second_simulator(lookout: Component, until: float) -> None:
+    """Raise SbsError if a simulator is discovered whose topics this one would publish too."""
+    while not lookout.count_publishers("inflow"):
+        if (left := until - time.monotonic()) <= 0.0:
+            return
+        time.sleep(min(left, 0.05))
+    raise SbsError("a simulator is flying already: --attach joins it, another ROS_DOMAIN_ID keeps apart from it")

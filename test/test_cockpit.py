@@ -152,11 +152,24 @@ def test_the_readout_says_what_the_state_says():
 def test_the_history_keeps_instants_apart_and_begins_anew_after_a_jump_back():
     snapshot, _ = snapshot_of_flight()
     history = History((*body_charts(AIRCRAFT), *rotor_charts(AIRCRAFT)))
+    assert len(history.table()) == 0
     for k in range(100):
         history.add(dataclasses.replace(snapshot, time=0.01 * k))
-    assert np.diff(history.table()[:, 0]).min() >= 0.999 * PERIOD
+    times = history.table()[:, 0]
+    assert np.diff(times[:-1]).min() >= 0.999 * PERIOD
+    assert times[-1] == 0.99  # the newest is there in any case: single steps are seen
     history.add(dataclasses.replace(snapshot, time=0.2))
-    assert len(history.table()) <= 1
+    assert set(history.table()[:, 0]) == {0.2}
+
+
+def test_a_reset_of_a_paused_flight_is_seen():
+    snapshot, _ = snapshot_of_flight()
+    history = History(body_charts(AIRCRAFT))
+    history.add(snapshot)
+    moved = snapshot.state.copy()
+    moved[S.POSITION + 2] = -99.0
+    history.add(dataclasses.replace(snapshot, state=moved))
+    assert history.table()[-1, -1] == 99.0
 
 
 def test_charts_have_a_name_for_every_value():

@@ -19,6 +19,7 @@ COCKPIT = ROOT / "install" / "sbs_sim" / "lib" / "sbs_sim" / "cockpit"
 IMAGES = ROOT / "docs" / "images"
 PORT = 8197
 SIZES = {"cockpit": (1280, 800), "cockpit_1920": (1920, 1080)}
+PACE = "0.25"  # time to take a picture before a helicopter that nobody holds has left
 NUDGES = ("y", "y", "l", "l", "j", "j", "h", "h", "i", "k")
 
 
@@ -48,17 +49,19 @@ def _take(page: object, path: Path, modes: bool) -> None:
     page.get_by_label("Airspeed [m/s]").fill("8")
     page.get_by_label("Airspeed [m/s]").press("Enter")
     page.get_by_text("Reset to a trimmed flight").click()
+    page.get_by_label("Real time ×").click()
+    page.get_by_role("option", name=PACE, exact=True).click()
     page.get_by_role("button", name="Reset", exact=True).click()
-    page.wait_for_timeout(500)
+    page.wait_for_timeout(1000)
     page.get_by_role("button", name="Linearize here").click()
     page.get_by_text("Linear model at").first.wait_for()
     page.keyboard.press("Space")
     for key in NUDGES:
-        page.wait_for_timeout(400)
+        page.wait_for_timeout(600)
         page.keyboard.press(key)
     if modes:
         page.get_by_role("tab", name="Modes").click()
-    page.wait_for_timeout(1500)
+    page.wait_for_timeout(1000)
     page.screenshot(path=path)
     page.keyboard.press("Space")
 

@@ -122,23 +122,26 @@ class History:
     def __init__(self, charts: Sequence[Chart]) -> None:
         self._charts = charts
         self._rows: collections.deque[list[float]] = collections.deque(maxlen=math.ceil(WINDOW / PERIOD) + 1)
+        self._newest: list[float] = []
 
     def add(self, snapshot: Snapshot) -> None:
-        """Keep an instant; one that is before the last one begins anew."""
-        last = self._rows[-1][0] if self._rows else -math.inf
-        if snapshot.time < last:
+        """Take an instant, to be kept if it is far enough from the last one; one before that begins anew."""
+        if self._rows and snapshot.time < self._rows[-1][0]:
             self._rows.clear()
-        elif snapshot.time < last + 0.999 * PERIOD:
-            return
-        self._rows.append([snapshot.time, *(value for chart in self._charts for value in chart.values(snapshot))])
+        self._newest = [snapshot.time, *(value for chart in self._charts for value in chart.values(snapshot))]
+        if not self._rows or snapshot.time >= self._rows[-1][0] + 0.999 * PERIOD:
+            self._rows.append(self._newest)
 
     def clear(self) -> None:
         """Forget all."""
         self._rows.clear()
+        self._newest = []
 
     def table(self) -> Array:
-        """Time and values, shape (instants, 1 + curves of all charts)."""
-        return np.array(self._rows) if self._rows else np.zeros((0, 1 + sum(len(c.names) for c in self._charts)))
+        """Time and values of what is kept and of the newest instant, shape (instants, 1 + curves of all charts)."""
+        if not self._rows:
+            return np.zeros((0, 1 + sum(len(chart.names) for chart in self._charts)))
+        return np.array([*self._rows, self._newest])
 
 
 class ChartColumn:
@@ -163,17 +166,16 @@ class ChartColumn:
         table = self.history.table()
         if not len(table):
             return
-        begin = max(table[0, 0], table[-1, 0] - WINDOW)
+        time = table[:, 0].copy()
         column = 1
         for chart, caption, plot in zip(self._charts, self._captions, self._plots, strict=True):
             curves = table[:, column : column + len(chart.names)]
             column += len(chart.names)
             caption.content = _caption(chart, curves[-1])
-            plot.scales = {
-                "x": {"time": False, "range": (begin, begin + WINDOW)},
-                "y": {"range": _range(curves, chart)},
-            }
-            plot.data = (table[:, 0].copy(), *(curve.copy() for curve in curves.T))
+            # nothing but the data is changed: other properties make the page build its charts anew
+            limits = np.full(len(time), _range(curves, chart)[0])
+            limits[-1] = _range(curves, chart)[1]
+            plot.data = (time, *(curve.copy() for curve in curves.T), limits)
 
     def remove(self) -> None:
         """Take the charts off the page."""
@@ -182,6 +184,7 @@ class ChartColumn:
 
 
 def _range(curves: Array, chart: Chart) -> tuple[float, float]:
+    """Limits of the vertical axis; rounding does not fill it."""
     low, high = float(curves.min()), float(curves.max())
     margin = max(0.06 * (high - low), 0.5 * (chart.least - (high - low)), LEAST_SPAN * max(abs(low), abs(high)))
     return low - margin, high + margin
@@ -206,9 +209,11 @@ def _plot(server: ViserServer, chart: Chart) -> Any:
     series: list[uplot.Series] = [{"label": "t [s]"}]
     for i, name in enumerate(chart.names):
         series.append({"label": name, "stroke": COLOURS[i % len(COLOURS)], "width": 1.2, "points": {"show": False}})
+    # what nobody sees holds the vertical axis to the limits that it is given
+    series.append({"label": "limits", "width": 0.0, "stroke": "transparent", "points": {"show": False}})
     nothing = np.array([0.0])
     return server.gui.add_uplot(
-        (nothing, *(nothing for _ in chart.names)),
+        tuple(nothing for _ in series),
         tuple(series),
         scales={"x": {"time": False}, "y": {}},
         axes=({**axis, "size": 22.0, "space": 60.0}, {**axis, "size": 46.0, "space": 22.0}),

@@ -323,7 +323,7 @@ class ViewPanel:
         cameras.on_click(lambda event: place_camera(event.client, CAMERAS[event.target.value]))
 
 
-CAMERAS = {"behind": (-2.6, 1.5, 1.3), "left": (0.0, 3.0, 0.35), "above": (-0.01, 0.0, 3.4), "front": (2.8, 0.8, 0.6)}
+CAMERAS = {"behind": (-2.0, 1.2, 1.0), "left": (0.0, 2.6, 0.3), "above": (-0.01, 0.0, 3.0), "front": (2.2, 0.7, 0.6)}
 
 
 def place_camera(client: Any, position: tuple[float, float, float]) -> None:

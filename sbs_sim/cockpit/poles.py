@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 STABLE, UNSTABLE = "#0072B2", "#D55E00"
+NAME_SHIFT = 9  # points
 NEAR = 8.0  # rad/s: the poles of the body lie within, those of the rotors without
 SETTINGS = {"svg.fonttype": "none", "svg.hashsalt": "sbs_sim", "font.size": 8.0, "font.family": "sans-serif"}
 
@@ -88,7 +89,7 @@ def _draw(axes: Axes, poles: Sequence[tuple[int, Pole]], with_names: bool) -> No
         places.setdefault(place, []).append((number, pole))
     axes.margins(0.14, 0.18)
     middle = sum(axes.get_xlim()) / 2
-    for together in places.values():
+    for i, together in enumerate(places.values()):
         value = np.mean([pole.value for _, pole in together])
         text = _numbers([number for number, _ in together])
         if with_names:
@@ -97,7 +98,7 @@ def _draw(axes: Axes, poles: Sequence[tuple[int, Pole]], with_names: bool) -> No
         axes.annotate(
             text,
             (value.real, value.imag),
-            xytext=(-5 if left else 5, 3),
+            xytext=(-5 if left else 5, 3 + NAME_SHIFT * (i % 2 if with_names else 0)),  # neighbours at two heights
             ha="right" if left else "left",
             textcoords="offset points",
             fontsize=7,

@@ -82,7 +82,7 @@ def readout(aircraft: Aircraft, snapshot: Snapshot, status: Status, source: str)
         ("ground speed", f"{math.hypot(ground[0], ground[1]):.2f}", "m/s"),
         ("climb", _fixed(-ground[2]), "m/s"),
         ("height", _fixed(-state[S.POSITION + 2]), "m"),
-        ("heading", f"{math.degrees(yaw) % 360:.1f}", "deg"),
+        ("heading", f"{round(math.degrees(yaw), 1) % 360:.1f}", "deg"),
         ("thrust", f"{snapshot.loads[:, P.THRUST].sum():.1f}", "N"),
         ("power", f"{power:.0f}", "W"),
     )

@@ -29,7 +29,8 @@ NED_TO_VIEW = (0.0, 1.0, 0.0, 0.0)  # half turn about north
 SKY, GROUND, GRID, SECTION = (233, 240, 246), (214, 220, 212), (196, 203, 195), (160, 168, 160)
 FUSELAGE, DUCT, BLADE, FIRST_BLADE = (92, 104, 118), (150, 160, 170), (52, 60, 70), (213, 94, 0)
 THRUST, MOMENT, PATH, TRAIL = (0, 114, 178), (204, 121, 167), (0, 158, 115), (90, 100, 110)
-AMBIENT = 1.2
+AMBIENT, SUN = 1.9, 1.6  # of light; together they show the colours of what faces up as they are
+TO_SUN = (-2.0, -1.0, -4.0)  # NED
 FOG = (60.0, 400.0)  # m
 GRID_SIZE = 2000.0  # m
 RINGS, SECTORS, PATH_POINTS = 4, 24, 60
@@ -266,8 +267,9 @@ def _add_ground(scene: Any) -> None:
     scene.set_background_image(np.full((2, 2, 3), SKY, dtype=np.uint8), format="png")
     scene.configure_fog(*FOG, color=SKY)
     scene.configure_environment_map(None)  # its light would wash out the colours, which mean something here
-    scene.configure_default_lights(cast_shadow=False)
+    scene.configure_default_lights(False)
     scene.add_light_ambient("/ned/ambient", intensity=AMBIENT)
+    scene.add_light_directional("/ned/sun", intensity=SUN, position=TO_SUN)
     scene.add_grid(
         "/ned/earth/grid",
         GRID_SIZE,
@@ -356,7 +358,7 @@ def _add_ring(scene: Any, name: str, rotor: Rotor, hub: Array, edges: Array, azi
         batched_positions=np.zeros((len(azimuths), 3)),
         batched_colors=np.tile(COLOURS[0].astype(np.uint8), (len(azimuths), 1)),
         lod="off",
-        opacity=0.75,
+        opacity=0.9,
         side="double",
         cast_shadow=False,
         receive_shadow=False,

@@ -4,8 +4,6 @@ Subscribes `state`, `rotors`, `inflow`, `events`, `status`, `linear_model`; publ
 `reset`, `set_wind`, `trim`, `linearize`, and sets the simulator's `real_time_factor`.
 """
 
-import contextlib
-import io
 import os
 import sys
 import threading
@@ -14,6 +12,7 @@ import traceback
 from pathlib import Path
 
 import numpy as np
+import rich
 from numpy.typing import NDArray
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -171,8 +170,8 @@ def _poles(model: LinearModel) -> tuple[list[Pole], str]:
 
 def serve(host: str, port: int) -> ViserServer:
     """Server of the page, which says nothing of itself and is not to be shared through another machine."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        server = ViserServer(host, port, verbose=False)
+    rich.get_console().quiet = True  # viser prints through it
+    server = ViserServer(host, port, verbose=False)
     server.request_share_url = lambda verbose=True: None  # a page could ask for it
     if server.get_port() != port:  # viser goes on to the next port that is free
         server.stop()

@@ -127,7 +127,7 @@ class RemotePilot:
             ("pitch", math.degrees(point.pitch)),
             ("roll", math.degrees(point.roll)),
         ]
-        table = "\n".join(f"| {name} | {value + 0.0:.3f} | deg |" for name, value in rows)
+        table = "\n".join(f"| {name} | {round(value, 3) + 0.0:.3f} | deg |" for name, value in rows)
         return True, (
             f"**Trim at {_words(condition)}**\n\n| | | |\n|---|--:|---|\n{table}\n| thrust | {point.thrust:.1f} | N |\n"
             f"| power | {point.power:.0f} | W |\n" + "".join(f"\n{text}\n" for text in point.beyond_limits)

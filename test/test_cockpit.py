@@ -271,6 +271,7 @@ def end_of_cockpit(*arguments, domain=0):
         (["--port", "0"], "--port 0: allowed are 1 to 65535"),
         (["--port", "70000"], "--port 70000: allowed are 1 to 65535"),
         (["--port", "x"], "--port: invalid int value: 'x'"),
+        (["--host", ""], "--host is empty"),
         (["--fly"], "--fly"),
     ],
 )
@@ -288,6 +289,13 @@ def test_a_port_that_is_taken_is_told_in_one_line():
     assert len(lines) == 1
     assert f"127.0.0.1:{port}" in lines[0]
     assert "--port" in lines[0]
+
+
+def test_a_host_that_is_not_this_machine_is_told_in_one_line():
+    code, lines = end_of_cockpit("--host", "192.0.2.1", domain=next(DOMAINS))  # RFC 5737: nobody has it
+    assert code == 1
+    assert len(lines) == 1
+    assert "192.0.2.1" in lines[0]
 
 
 def test_a_wrong_parameter_of_the_simulator_ends_the_cockpit_with_its_line():

@@ -148,6 +148,8 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     if not 1 <= options.port <= 65535:
         parser.error(f"--port {options.port}: allowed are 1 to 65535")
+    if not options.host:
+        parser.error("--host is empty: allowed are names and addresses of this machine, 0.0.0.0 for all of them")
     return options
 
 

@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 MESSAGES = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "status": SimulationStatus}
 LONGEST_LEAD = 0.1  # s of simulation time that rotors are turned on without a message
+SILENCE = 3.0  # s without a message of a flight that plays: it is gone
 NICE = 5  # the flight comes before its picture
 
 
@@ -99,9 +100,10 @@ class Cockpit(Component):
         snapshot = snapshot_of(
             self._aircraft, newest["state"], newest["rotors"], newest["inflow"], self._swashplate, self._wind
         )
-        playing = told.state == SimulationStatus.PLAYING
-        lead = min((time.monotonic() - self._arrived) * told.real_time_factor, LONGEST_LEAD) if playing else 0.0
-        return Live(snapshot, lead, _status(told))
+        playing, age = told.state == SimulationStatus.PLAYING, time.monotonic() - self._arrived
+        if playing and age > SILENCE:
+            told.fault = told.fault or f"no message of the simulator for {age:.0f} s"
+        return Live(snapshot, min(age * told.real_time_factor, LONGEST_LEAD) if playing else 0.0, _status(told))
 
     # --------------------------------------------------------------------------------------------------- the page
 

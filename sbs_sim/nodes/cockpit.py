@@ -43,7 +43,7 @@ class Simulator:
 
     def __init__(self, ros_arguments: list[str], end: threading.Event) -> None:
         path = Path(sys.argv[0]).resolve().with_name("simulator")
-        height = ["--ros-args", "-p", f"simulator:altitude:={START_HEIGHT}"]  # first: what the user says comes after
+        height = ["--ros-args", "-p", f"altitude:={START_HEIGHT}"]  # first: what the user says comes after
         command = [sys.executable, str(path), *height, *ros_arguments[1:]]
         # a session of its own: Ctrl-C comes to the cockpit, which ends the simulator when it has let go of it
         self._process = subprocess.Popen(command, start_new_session=True, preexec_fn=_end_with_parent)

@@ -41,6 +41,7 @@ setup(
             "control_mixer = sbs_sim.nodes.executables:control_mixer",
             "analysis = sbs_sim.nodes.executables:analysis",
             "replay = sbs_sim.nodes.executables:replay",
+            "cockpit = sbs_sim.nodes.executables:cockpit",
             "trim = sbs_sim.commands.trim:main",
             "linearize = sbs_sim.commands.linearize:main",
             "sweep = sbs_sim.commands.sweep:main",

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,9 +37,17 @@ def environment(domain: int, folder: Path | None = None) -> dict[str, str]:
 class Process:
     """A running executable with its output in a file."""
 
-    def __init__(self, name: str, domain: int, folder: Path, parameters: dict[str, Any], remaps: list[str]) -> None:
+    def __init__(
+        self,
+        name: str,
+        domain: int,
+        folder: Path,
+        parameters: dict[str, Any],
+        remaps: Sequence[str] = (),
+        arguments: Sequence[str] = (),
+    ) -> None:
         self.log = folder / f"{name}-{time.monotonic_ns()}.log"
-        command = [sys.executable, str(EXECUTABLES / name), "--ros-args"]
+        command = [sys.executable, str(EXECUTABLES / name), *arguments, "--ros-args"]
         for key, value in parameters.items():
             command += ["-p", f"{key}:={value}"]
         for remap in remaps:
@@ -209,9 +217,9 @@ class World:
         self.client = Client(domain)
         self.processes: list[Process] = []
 
-    def start(self, name: str, remaps: list[str] | None = None, **parameters: Any) -> Process:
-        """Start an executable with parameters."""
-        process = Process(name, self.domain, self.folder, parameters, remaps or [])
+    def start(self, name: str, remaps: Sequence[str] = (), arguments: Sequence[str] = (), **parameters: Any) -> Process:
+        """Start an executable with arguments of its own and with parameters."""
+        process = Process(name, self.domain, self.folder, parameters, remaps, arguments)
         self.processes.append(process)
         return process
 

@@ -36,6 +36,7 @@ from sbs_msgs.msg import Wind as WindMessage
 from sbs_msgs.srv import SetWind
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import linearize, modes, sweep, trim
+from sbs_sim.errors import SimulationError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.average import averaged_derivative
@@ -58,6 +59,11 @@ def to_time(seconds: float) -> Time:
     """ROS time of a simulation time [s]."""
     nanoseconds = round(seconds * 1e9)
     return Time(sec=nanoseconds // 1_000_000_000, nanosec=nanoseconds % 1_000_000_000)
+
+
+def to_seconds(time: Time) -> float:
+    """Time [s] of a ROS time."""
+    return time.sec + 1e-9 * time.nanosec
 
 
 def controls_array(message: Controls) -> Array:
@@ -224,6 +230,57 @@ def enu_flu_quaternion(ned_frd: Sequence[float]) -> tuple[float, float, float, f
     """
     w, x, y, z = ned_frd
     return HALF * (w + z), HALF * (x + y), HALF * (x - y), HALF * (w - z)
+
+
+def snapshot_of(
+    aircraft: Aircraft, body: BodyState, rotors: RotorStateArray, inflow: InflowArray, swashplate: Array, wind: Array
+) -> Snapshot:
+    """Snapshot that the messages of one instant tell of; its step is 0, since they do not say it.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    body : BodyState
+    rotors : RotorStateArray
+    inflow : InflowArray
+    swashplate : ndarray, shape (n_rotors, 3)
+        [rad]
+    wind : ndarray, shape (3,)
+        Velocity of the air, NED [m/s].
+
+    Raises
+    ------
+    SimulationError
+        The messages are of an aircraft with other rotors.
+    """
+    layout, count = aircraft.layout, len(aircraft.rotors)
+    blades = tuple(len(rotor.flap) for rotor in rotors.rotors)
+    if blades != layout.blades or len(inflow.rotors) != count:
+        raise SimulationError(f"the flight has rotors with {blades} blades, {aircraft.name} has {layout.blades}")
+    state = np.empty(layout.size)
+    attitude = body.attitude
+    state[S.POSITION : S.ATTITUDE] = _triple(body.position)
+    state[S.ATTITUDE : S.VELOCITY] = attitude.w, attitude.x, attitude.y, attitude.z
+    state[S.VELOCITY : S.RATES] = _triple(body.velocity)
+    state[S.RATES : S.BODY_SIZE] = _triple(body.angular_velocity)
+    loads = np.zeros((count, P.LOAD_SIZE))
+    for j, rotor in enumerate(rotors.rotors):
+        state[layout.flap(j)], state[layout.flap_rate(j)] = rotor.flap, rotor.flap_rate
+        state[layout.lag(j)], state[layout.lag_rate(j)] = rotor.lag, rotor.lag_rate
+        state[layout.inflow(j)] = inflow.rotors[j].uniform, inflow.rotors[j].sine, inflow.rotors[j].cosine
+        loads[j, P.THRUST], loads[j, P.TORQUE] = rotor.thrust, rotor.torque
+        loads[j, P.FORCE : P.FORCE + 3] = _triple(rotor.hub.force)
+        loads[j, P.MOMENT : P.MOMENT + 3] = _triple(rotor.hub.torque)
+    return Snapshot(
+        step=0,
+        time=to_seconds(body.header.stamp),
+        state=state,
+        acceleration=np.array(_triple(body.acceleration)),
+        swashplate=swashplate,
+        azimuth=np.array([rotor.azimuth for rotor in rotors.rotors]),
+        loads=loads,
+        wind=wind,
+    )
 
 
 def _set_quaternion(target: Quaternion, values: Sequence[float]) -> None:

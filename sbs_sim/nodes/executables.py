@@ -43,6 +43,14 @@ def replay() -> None:
     main()
 
 
+def cockpit() -> None:
+    """Run the executable `cockpit`."""
+    _end_at_once_when_interrupted()
+    from sbs_sim.nodes.cockpit import main
+
+    main()
+
+
 def _end_at_once_when_interrupted(code: int = 0) -> None:
     """Until the nodes run there is nothing to be ended in good order: `sbs_sim.nodes.host.run` takes over then."""
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -1,0 +1,1 @@
+"""The cockpit: a page in the browser that draws a flight, live or from a log. Nothing here knows of ROS."""

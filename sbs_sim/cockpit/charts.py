@@ -1,0 +1,224 @@
+"""Time histories: what is kept of each instant, and the charts of it."""
+
+import collections
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from viser import ViserServer, uplot
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.model import params as P
+from sbs_sim.model import state as S
+from sbs_sim.model.frames import quaternion_to_euler
+from sbs_sim.simulation import Snapshot
+
+Array = NDArray[np.float64]
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito
+WINDOW = 20.0  # s of simulation time that the charts show
+PERIOD = 0.04  # s of simulation time between two instants that are kept
+AXIS = "#5c6670"
+FONT = "10px sans-serif"
+HEIGHT = 100  # pixels of a chart
+LEAST_SPAN = 1e-3  # that a vertical axis covers, over the largest value: rounding is no signal
+DEGREES = 180.0 / math.pi
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Curves on common axes.
+
+    Attributes
+    ----------
+    title, unit : str
+    names : tuple of str
+        One for each curve.
+    values : callable
+        Of a snapshot, in the order of the names and in the unit.
+    digits : int
+        Decimals of the numbers beside the title.
+    least : float
+        What the vertical axis covers at least.
+    """
+
+    title: str
+    unit: str
+    names: tuple[str, ...]
+    values: Callable[[Snapshot], Sequence[float]]
+    digits: int
+    least: float
+
+
+def pilot_controls(aircraft: Aircraft, swashplate: Array) -> Array:
+    """Pilot controls [rad], shape (4,), whose mixture comes nearest to swashplate angles [rad], shape (n_rotors, 3)."""
+    mixing = np.concatenate([rotor.mixing for rotor in aircraft.rotors])
+    found, *_ = np.linalg.lstsq(mixing, swashplate.ravel(), rcond=None)
+    return found
+
+
+def body_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
+    """Charts of the body and the controls."""
+
+    def attitude(snapshot: Snapshot) -> list[float]:
+        yaw, pitch, roll = quaternion_to_euler(snapshot.state[S.ATTITUDE : S.VELOCITY])
+        return [roll * DEGREES, pitch * DEGREES, yaw * DEGREES]
+
+    def part(first: int, factor: float) -> Callable[[Snapshot], Sequence[float]]:
+        return lambda snapshot: list(factor * snapshot.state[first : first + 3])
+
+    def controls(snapshot: Snapshot) -> list[float]:
+        return list(DEGREES * pilot_controls(aircraft, snapshot.swashplate))
+
+    def height(snapshot: Snapshot) -> list[float]:
+        return [-float(snapshot.state[S.POSITION + 2])]
+
+    return (
+        Chart("Attitude", "deg", ("roll", "pitch", "yaw"), attitude, 2, 1.0),
+        Chart("Rates", "deg/s", ("p", "q", "r"), part(S.RATES, DEGREES), 2, 1.0),
+        Chart("Controls", "deg", ("coll", "lat", "lon", "diff"), controls, 2, 1.0),
+        Chart("Velocity, body axes", "m/s", ("u", "v", "w"), part(S.VELOCITY, 1.0), 2, 0.5),
+        Chart("Height", "m", ("above origin",), height, 2, 0.5),
+    )
+
+
+def rotor_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
+    """Charts of the rotors; of coordinates the first three, whatever the number of blades."""
+    layout, rotors = aircraft.layout, range(len(aircraft.rotors))
+    several = len(aircraft.rotors) > 1
+
+    def names(*kinds: str) -> tuple[str, ...]:
+        return tuple(f"{kind} ({j + 1})" if several else kind for j in rotors for kind in kinds)
+
+    def coordinates(place: Callable[[int], slice], factor: float) -> Callable[[Snapshot], Sequence[float]]:
+        return lambda snapshot: [float(factor * value) for j in rotors for value in snapshot.state[place(j)][:3]]
+
+    def load(column: int) -> Callable[[Snapshot], Sequence[float]]:
+        return lambda snapshot: [float(snapshot.loads[j, column]) for j in rotors]
+
+    def power(snapshot: Snapshot) -> list[float]:
+        return [float(snapshot.loads[j, P.TORQUE]) * aircraft.rotors[j].speed for j in rotors]
+
+    return (
+        Chart("Flap", "deg", names("a0", "a1", "b1"), coordinates(layout.flap, DEGREES), 2, 0.1),
+        Chart("Lag", "deg", names("ξ0", "ξc", "ξs"), coordinates(layout.lag, DEGREES), 2, 0.1),
+        Chart("Inflow, over tip speed", "1", names("λ0", "λs", "λc"), coordinates(layout.inflow, 1.0), 4, 1e-3),
+        Chart("Thrust", "N", names("T"), load(P.THRUST), 1, 5.0),
+        Chart("Power", "W", names("P"), power, 0, 50.0),
+    )
+
+
+class History:
+    """The charts' values of the last seconds.
+
+    Parameters
+    ----------
+    charts : sequence of Chart
+    """
+
+    def __init__(self, charts: Sequence[Chart]) -> None:
+        self._charts = charts
+        self._rows: collections.deque[list[float]] = collections.deque(maxlen=math.ceil(WINDOW / PERIOD) + 1)
+        self._newest: list[float] = []
+
+    def add(self, snapshot: Snapshot) -> None:
+        """Take an instant, to be kept if it is far enough from the last one; one before that begins anew."""
+        if self._rows and snapshot.time < self._rows[-1][0]:
+            self._rows.clear()
+        self._newest = [snapshot.time, *(value for chart in self._charts for value in chart.values(snapshot))]
+        if not self._rows or snapshot.time >= self._rows[-1][0] + 0.999 * PERIOD:
+            self._rows.append(self._newest)
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._rows.clear()
+        self._newest = []
+
+    def table(self) -> Array:
+        """Time and values of what is kept and of the newest instant, shape (instants, 1 + curves of all charts)."""
+        if not self._rows:
+            return np.zeros((0, 1 + sum(len(chart.names) for chart in self._charts)))
+        return np.array([*self._rows, self._newest])
+
+
+class ChartColumn:
+    """Charts below each other.
+
+    Parameters
+    ----------
+    server : ViserServer
+    charts : sequence of Chart
+    """
+
+    def __init__(self, server: ViserServer, charts: Sequence[Chart]) -> None:
+        self._charts = charts
+        self.history = History(charts)
+        self._captions, self._plots = [], []
+        for chart in charts:
+            self._captions.append(server.gui.add_html(_caption(chart, None)))
+            self._plots.append(_plot(server, chart))
+
+    def update(self) -> None:
+        """Draw what the history holds."""
+        table = self.history.table()
+        if not len(table):
+            return
+        time = table[:, 0].copy()
+        column = 1
+        for chart, caption, plot in zip(self._charts, self._captions, self._plots, strict=True):
+            curves = table[:, column : column + len(chart.names)]
+            column += len(chart.names)
+            caption.content = _caption(chart, curves[-1])
+            # nothing but the data is changed: other properties make the page build its charts anew
+            limits = np.full(len(time), _range(curves, chart)[0])
+            limits[-1] = _range(curves, chart)[1]
+            plot.data = (time, *(curve.copy() for curve in curves.T), limits)
+
+    def remove(self) -> None:
+        """Take the charts off the page."""
+        for handle in (*self._captions, *self._plots):
+            handle.remove()
+
+
+def _range(curves: Array, chart: Chart) -> tuple[float, float]:
+    """Limits of the vertical axis; rounding does not fill it."""
+    low, high = float(curves.min()), float(curves.max())
+    margin = max(0.06 * (high - low), 0.5 * (chart.least - (high - low)), LEAST_SPAN * max(abs(low), abs(high)))
+    return low - margin, high + margin
+
+
+def _caption(chart: Chart, values: Array | None) -> str:
+    """Title, unit, and the names of the curves in their colours with their latest values."""
+    parts = []
+    for i, name in enumerate(chart.names):
+        number = "" if values is None else f" {round(values[i], chart.digits) + 0.0:.{chart.digits}f}"
+        parts.append(f'<span style="color:{COLOURS[i % len(COLOURS)]};white-space:nowrap">{name}{number}</span>')
+    style = "font:11px sans-serif;padding:2px 8px 0 8px;margin-bottom:-8px;line-height:1.3"
+    return (
+        f'<div style="{style};font-variant-numeric:tabular-nums">'
+        f"<b>{chart.title}</b> [{chart.unit}]&ensp;{'&ensp;'.join(parts)}</div>"
+    )
+
+
+def _plot(server: ViserServer, chart: Chart) -> Any:
+    grid = {"stroke": "#e3e6e9", "width": 1.0}
+    axis: dict[str, Any] = {"stroke": AXIS, "font": FONT, "grid": grid, "ticks": {"show": False}}
+    series: list[uplot.Series] = [{"label": "t [s]"}]
+    for i, name in enumerate(chart.names):
+        series.append({"label": name, "stroke": COLOURS[i % len(COLOURS)], "width": 1.2, "points": {"show": False}})
+    # what nobody sees holds the vertical axis to the limits that it is given
+    series.append({"label": "limits", "width": 0.0, "stroke": "transparent", "points": {"show": False}})
+    nothing = np.array([0.0])
+    return server.gui.add_uplot(
+        tuple(nothing for _ in series),
+        tuple(series),
+        scales={"x": {"time": False}, "y": {}},
+        axes=({**axis, "size": 22.0, "space": 60.0}, {**axis, "size": 46.0, "space": 22.0}),
+        legend={"show": False},
+        cursor={"show": False},
+        height=HEIGHT,
+        padding=(9, 10, 0, 0),
+    )

@@ -1,0 +1,333 @@
+"""The controls of the page: sliders, buttons, keys. What they do is done by a `Pilot`."""
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from viser import ViserServer
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.trim import TrimCondition
+from sbs_sim.cockpit.scene import Shown
+from sbs_sim.model.state import CONTROL_NAMES
+
+Array = NDArray[np.float64]
+Answer = tuple[bool, str]  # whether it was done, and what is to be said
+
+SLIDER_STEP, KEY_STEP = 0.02, 0.1  # deg
+PACES = ("0.01", "0.05", "0.1", "0.25", "0.5", "1", "2", "as fast as possible")
+LABELS = ("Collective", "Lateral", "Longitudinal", "Differential")
+HINTS = (
+    "blade pitch of all rotors; up is more thrust. Keys H, Y",
+    "right is positive: rolls right side down. Keys J, L",
+    "push is positive: nose down. Keys I, K",
+    "positive tilts the right disc forward and the left one back: turns the nose left. Keys U, O",
+)
+# One key for less and one for more of each control; they lie together, apart from those that move the camera.
+KEYS = (("H", "Y"), ("J", "L"), ("K", "I"), ("O", "U"))
+LIVE = "live"
+PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
+
+
+class Pilot(Protocol):
+    """What a page can ask of a flight."""
+
+    def command(self, controls: Array | None) -> None:
+        """Hold pilot controls [rad], shape (4,), from now on; None lets go of them."""
+
+    def pause(self, paused: bool) -> Answer:
+        """Pause or go on."""
+
+    def step(self, ticks: int) -> Answer:
+        """Fly some ticks while paused."""
+
+    def reset(self, condition: TrimCondition, height: float) -> Answer:
+        """Put the aircraft into a trimmed condition at a height above the origin [m]."""
+
+    def set_pace(self, factor: float) -> Answer:
+        """Simulation time over wall time; 0 is as fast as possible."""
+
+    def set_wind(self, velocity: Array, turbulence: float) -> Answer:
+        """Steady wind, NED [m/s], shape (3,), and standard deviation of turbulence in all directions [m/s]."""
+
+    def trim(self, condition: TrimCondition) -> Answer:
+        """Trim a condition and tell the result."""
+
+    def linearize(self, condition: TrimCondition) -> Answer:
+        """Linearize about a condition; the model comes by itself."""
+
+
+def _by_user(act: Callable[[], None]) -> Callable[[Any], None]:
+    """Callback that acts on what a user did, not on values that the program sets."""
+
+    def callback(event: Any) -> None:
+        if event.client is not None:
+            act()
+
+    return callback
+
+
+def _notify(server: ViserServer, title: str, text: str) -> None:
+    """Tell everyone who looks at the page what was refused."""
+    for client in server.get_clients().values():
+        client.add_notification(title, text, color="orange", auto_close_seconds=8.0)
+
+
+class FlyPanel:
+    """Controls, clock, place and wind of a live flight.
+
+    Parameters
+    ----------
+    server : ViserServer
+    aircraft : Aircraft
+    pilot : Pilot
+    here : callable
+        Condition of the flight right now, None before there is one.
+    """
+
+    def __init__(
+        self, server: ViserServer, aircraft: Aircraft, pilot: Pilot, here: Callable[[], TrimCondition | None]
+    ) -> None:
+        self._server, self._pilot, self._here = server, pilot, here
+        self._paused = False
+        self._holding = False
+        self._ranges = np.degrees([aircraft.control_ranges[name] for name in CONTROL_NAMES])
+        self._add_clock()
+        self._add_controls()
+        self._add_reset()
+        self._add_analysis()
+        self._add_wind()
+        self._add_keys()
+
+    # ------------------------------------------------------------------------------------------------------- parts
+
+    def _add_clock(self) -> None:
+        gui = self._server.gui
+        self._clock = gui.add_button_group("Flight", (PAUSE, STEP, RESET))
+        self._clock.on_click(lambda event: self._on_clock(event.target.value))
+        self._pace = gui.add_dropdown("Real time ×", PACES, initial_value="1")
+        self._pace.on_update(_by_user(self._on_pace))
+
+    def _add_controls(self) -> None:
+        gui = self._server.gui
+        with gui.add_folder("Controls [deg]"):
+            self._sliders = []
+            for i, label in enumerate(LABELS):
+                low, high = self._ranges[i]
+                slider = gui.add_slider(label, low, high, SLIDER_STEP, float(np.clip(0.0, low, high)), hint=HINTS[i])
+                slider.on_update(_by_user(self._on_slider))
+                self._sliders.append(slider)
+            self._hold = gui.add_checkbox("Hold", False, hint="the page keeps commanding; untick to let others fly")
+            self._hold.on_update(_by_user(self._on_hold))
+
+    def _add_reset(self) -> None:
+        gui = self._server.gui
+        with gui.add_folder("Reset to a trimmed flight", expand_by_default=False):
+            self._airspeed = gui.add_number("Airspeed [m/s]", 0.0, min=-100.0, max=100.0, step=0.5)
+            self._climb = gui.add_number("Climb [m/s]", 0.0, min=-50.0, max=50.0, step=0.1)
+            self._sideslip = gui.add_number("Sideslip [deg]", 0.0, min=-180.0, max=180.0, step=1.0)
+            self._turn = gui.add_number("Turn [deg/s]", 0.0, min=-170.0, max=170.0, step=1.0)
+            self._height = gui.add_number("Height [m]", 10.0, min=-1e5, max=1e5, step=1.0)
+
+    def _add_analysis(self) -> None:
+        gui = self._server.gui
+        buttons = gui.add_button_group("Analyse", ("Trim here", "Linearize here"))
+        buttons.on_click(lambda event: self._on_analysis(event.target.value))
+        self._result = gui.add_markdown("")
+
+    def _add_wind(self) -> None:
+        gui = self._server.gui
+        with gui.add_folder("Wind, where the air goes to", expand_by_default=False):
+            self._wind = [
+                gui.add_number(f"{name} [m/s]", 0.0, min=-100.0, max=100.0, step=0.5)
+                for name in ("North", "East", "Down")
+            ]
+            self._turbulence = gui.add_number("Turbulence, σ [m/s]", 0.0, min=0.0, max=20.0, step=0.1)
+            gui.add_button("Set wind").on_click(lambda _: self._on_wind())
+
+    def _add_keys(self) -> None:
+        add = self._server.gui.add_command
+        add("Pause or go on", hotkey="space").on_trigger(lambda _: self._on_clock(PAUSE))
+        add("Step", hotkey="N").on_trigger(lambda _: self._on_clock(STEP))
+        add("Reset", hotkey="R", modifier="shift").on_trigger(lambda _: self._on_clock(RESET))
+        for i, (label, keys) in enumerate(zip(LABELS, KEYS, strict=True)):
+            for key, sign in zip(keys, (-1, 1), strict=True):
+                name = f"{label} {'less' if sign < 0 else 'more'}"
+                add(name, hotkey=key).on_trigger(lambda _, i=i, sign=sign: self._nudge(i, sign * KEY_STEP))
+
+    # ----------------------------------------------------------------------------------------------------- actions
+
+    def _say(self, what: str, answer: Answer) -> None:
+        """Tell what was refused."""
+        done, message = answer
+        if not done:
+            _notify(self._server, f"{what} refused", message)
+
+    def _on_clock(self, button: str) -> None:
+        if button in (PLAY, PAUSE):
+            self._say(button, self._pilot.pause(not self._paused))
+        elif button == STEP:
+            self._say(button, self._pilot.step(1))
+        else:
+            self._release()
+            self._say(button, self._pilot.reset(self._condition(), self._height.value))
+
+    def _condition(self) -> TrimCondition:
+        sideslip, turn = math.radians(self._sideslip.value), math.radians(self._turn.value)
+        return TrimCondition(self._airspeed.value, self._climb.value, sideslip, turn)
+
+    def _on_pace(self) -> None:
+        factor = 0.0 if self._pace.value == PACES[-1] else float(self._pace.value)
+        self._say("Real-time factor", self._pilot.set_pace(factor))
+
+    def _on_slider(self) -> None:
+        self._holding = True
+        self._hold.value = True
+        self._pilot.command(np.radians([slider.value for slider in self._sliders]))
+
+    def _on_hold(self) -> None:
+        if self._hold.value:
+            self._on_slider()
+        else:
+            self._release()
+
+    def _release(self) -> None:
+        self._holding = False
+        self._hold.value = False
+        self._pilot.command(None)
+
+    def _nudge(self, which: int, change: float) -> None:
+        slider = self._sliders[which]
+        slider.value = float(np.clip(slider.value + change, *self._ranges[which]))
+        self._on_slider()
+
+    def _on_analysis(self, button: str) -> None:
+        condition = self._here()
+        if condition is None:
+            return
+        done, message = self._pilot.trim(condition) if button == "Trim here" else self._pilot.linearize(condition)
+        self._result.content = message if done else ""
+        self._say(button, (done, message))
+
+    def _on_wind(self) -> None:
+        velocity = np.array([number.value for number in self._wind])
+        self._say("Wind", self._pilot.set_wind(velocity, self._turbulence.value))
+
+    # ------------------------------------------------------------------------------------------------------ update
+
+    def update(self, controls: Array, playing: bool) -> None:
+        """Follow the flight: the controls that are in force [rad], unless this page commands them."""
+        if self._paused == playing:
+            self._paused = not playing
+            self._clock.options = (PAUSE if playing else PLAY, STEP, RESET)
+        if self._holding:
+            return
+        for slider, value in zip(self._sliders, np.degrees(controls), strict=True):
+            rounded = round(float(value), 3)
+            if abs(slider.value - rounded) > 0.5 * SLIDER_STEP:
+                slider.value = rounded
+
+
+class LogPanel:
+    """Choice of a log, and its playing.
+
+    Parameters
+    ----------
+    server : ViserServer
+    list_logs : callable
+        Paths that can be chosen.
+    choose : callable
+        Takes a path, or None for the live flight; what to say if it cannot be shown.
+    live : bool
+        There is a live flight.
+    """
+
+    def __init__(
+        self,
+        server: ViserServer,
+        list_logs: Callable[[], Sequence[Path]],
+        choose: Callable[[Path | None], Answer],
+        live: bool,
+    ) -> None:
+        self._server, self._list, self._choose = server, list_logs, choose
+        self._first = [LIVE] if live else []
+        self._paths: dict[str, Path] = {}
+        gui = server.gui
+        self._pick = gui.add_dropdown("Source", [*self._first, *self._names()] or ["none"])
+        self._pick.on_update(_by_user(self._on_pick))
+        gui.add_button("Look for new logs").on_click(lambda _: self._refresh())
+        self.playing = gui.add_checkbox("Play", True)
+        self.rate = gui.add_dropdown("Speed ×", PACES[:-1], initial_value="1")
+        self.place = gui.add_slider("Time [s]", 0.0, 1.0, 0.01, 0.0)
+        self.moved = False
+        self.place.on_update(_by_user(self._on_place))
+        self.message = gui.add_markdown("")
+        self.enable(False)
+
+    def _names(self) -> list[str]:
+        self._paths = {path.name: path for path in self._list()}
+        return list(self._paths)
+
+    def _refresh(self) -> None:
+        chosen = self._pick.value
+        self._pick.options = tuple([*self._first, *self._names()] or ["none"])
+        if chosen in self._pick.options:
+            self._pick.value = chosen
+
+    def _on_pick(self) -> None:
+        done, message = self._choose(self._paths.get(self._pick.value))
+        self.message.content = message
+        if not done:
+            _notify(self._server, "Log refused", message)
+
+    def _on_place(self) -> None:
+        self.moved = True
+
+    def enable(self, there: bool, beginning: float = 0.0, end: float = 1.0) -> None:
+        """Offer the controls of a log from a beginning to an end [s]."""
+        for handle in (self.playing, self.rate, self.place):
+            handle.disabled = not there
+        if there:
+            self.place.min, self.place.max = beginning, max(end, beginning + 0.01)
+
+
+class ViewPanel:
+    """What is shown, how large, from where.
+
+    Parameters
+    ----------
+    server : ViserServer
+    shown : Shown
+        Changed in place.
+    """
+
+    def __init__(self, server: ViserServer, shown: Shown) -> None:
+        gui = server.gui
+        magnification = gui.add_slider(
+            "Flap, lag ×", 1.0, 20.0, 0.5, shown.magnification, hint="flap and lag angles are drawn that much larger"
+        )
+        magnification.on_update(lambda _: setattr(shown, "magnification", magnification.value))
+        for field, label in (
+            ("ducts", "Ducts"),
+            ("paths", "Tip paths"),
+            ("arrows", "Thrust and hub moments"),
+            ("inflow", "Inflow"),
+            ("trail", "Trail"),
+        ):
+            box = gui.add_checkbox(label, getattr(shown, field))
+            box.on_update(lambda _, field=field, box=box: setattr(shown, field, box.value))
+        cameras = gui.add_button_group("From", tuple(CAMERAS))
+        cameras.on_click(lambda event: place_camera(event.client, CAMERAS[event.target.value]))
+
+
+CAMERAS = {"behind": (-2.0, 1.2, 1.0), "left": (0.0, 2.6, 0.3), "above": (-0.01, 0.0, 3.0), "front": (2.2, 0.7, 0.6)}
+
+
+def place_camera(client: Any, position: tuple[float, float, float]) -> None:
+    """Look at the aircraft from a place, in the viewer's axes [m]: north, west, up."""
+    if client is not None:
+        client.camera.position = position
+        client.camera.look_at = (0.0, 0.0, 0.0)

@@ -1,0 +1,219 @@
+"""The page: a server, its scene and panels, and one `draw` that shows what there is, live or from a log."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from viser import ViserServer
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.trim import TrimCondition
+from sbs_sim.cockpit.charts import ChartColumn, body_charts, pilot_controls, rotor_charts
+from sbs_sim.cockpit.panels import CAMERAS, Answer, FlyPanel, LogPanel, Pilot, ViewPanel
+from sbs_sim.cockpit.playback import Recording, recordings
+from sbs_sim.cockpit.poles import Pole, pole_page
+from sbs_sim.cockpit.readouts import Status, condition_here, readout
+from sbs_sim.cockpit.scene import ARROW_OF_MOMENT, COLOURS, MOMENT, PATH, THRUST, Scene, Shown
+from sbs_sim.errors import SbsError
+from sbs_sim.simulation import Snapshot
+
+FRAME_PERIOD = 1.0 / 30.0  # s
+READOUT_EVERY, CHARTS_EVERY = 3, 6  # frames
+PANEL_WIDTH = 308  # pixels
+
+
+NO_MODEL = '<div style="font:12px sans-serif;padding:10px">No linear model yet: <b>Linearize here</b> makes one.</div>'
+
+
+@dataclass(frozen=True)
+class Live:
+    """A flight as it is right now.
+
+    Attributes
+    ----------
+    snapshot : Snapshot
+    lead : float
+        Simulation time that has gone since the snapshot [s].
+    status : Status
+    """
+
+    snapshot: Snapshot
+    lead: float
+    status: Status
+
+
+class View:
+    """See the module.
+
+    Parameters
+    ----------
+    server : ViserServer
+    aircraft : Aircraft
+        Of the live flight.
+    pilot : Pilot
+    live : callable
+        The live flight, None while there is none.
+    folder : Path
+        Where the logs are.
+    """
+
+    def __init__(
+        self, server: ViserServer, aircraft: Aircraft, pilot: Pilot, live: Callable[[], Live | None], folder: Path
+    ) -> None:
+        self._server, self._aircraft, self._live = server, aircraft, live
+        self._recording: Recording | None = None
+        self._place = 0.0
+        self._lock = threading.RLock()  # callbacks of the page come in threads of their own
+        self._frames = 0
+        self._shown = Shown()
+        self._scene = Scene(server, aircraft, self._shown)
+        server.initial_camera.position = CAMERAS["behind"]
+        server.initial_camera.look_at = (0.0, 0.0, 0.0)
+        server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
+        self._add_main_panel(pilot, folder)
+        self._add_charts()
+
+    def _add_main_panel(self, pilot: Pilot, folder: Path) -> None:
+        gui = self._server.gui
+        gui.set_panel_label("sbs_sim")
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(PANEL_WIDTH)
+        self._readout = gui.add_html("")
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Fly"):
+            self._fly = FlyPanel(self._server, self._aircraft, pilot, self._here)
+        with tabs.add_tab("Logs"):
+            self._logs = LogPanel(self._server, lambda: recordings(folder), self.show, True)
+        with tabs.add_tab("View"):
+            ViewPanel(self._server, self._shown)
+            gui.add_html(_legend(self._scene))
+
+    def _add_charts(self) -> None:
+        panel = self._server.gui.add_panel()
+        self._tabs = (panel.add_tab("Body"), panel.add_tab("Rotors"))
+        with panel.add_tab("Modes"):
+            self._modes = self._server.gui.add_html(NO_MODEL)
+        panel.dock_left()
+        panel.set_width(PANEL_WIDTH)
+        self._columns = self._make_columns(self._aircraft)
+
+    def _make_columns(self, aircraft: Aircraft) -> list[ChartColumn]:
+        columns = []
+        for tab, charts in zip(self._tabs, (body_charts(aircraft), rotor_charts(aircraft)), strict=True):
+            with tab:
+                columns.append(ChartColumn(self._server, charts))
+        return columns
+
+    # -------------------------------------------------------------------------------------------------- what to show
+
+    def show(self, path: Path | None) -> Answer:
+        """Show a log from its beginning, or the live flight; a log that cannot be shown changes nothing."""
+        try:
+            recording = None if path is None else Recording(path)
+        except SbsError as error:
+            return False, str(error)
+        with self._lock:
+            self._recording = recording
+            self._place = recording.beginning if recording else 0.0
+            self._use(recording.aircraft if recording else self._aircraft)
+            if recording is None:
+                self._logs.enable(False)
+                return True, ""
+            self._logs.enable(True, recording.beginning, recording.end)
+        whole = "" if recording.complete else ", not complete"
+        return True, f"{recording.aircraft.name}, {recording.end - recording.beginning:.1f} s{whole}"
+
+    def show_model(self, poles: list[Pole], title: str) -> None:
+        """Show the poles of a linear model."""
+        self._modes.content = pole_page(poles, title)
+
+    def _here(self) -> TrimCondition | None:
+        live = self._live()
+        return None if live is None else condition_here(live.snapshot)
+
+    def _use(self, aircraft: Aircraft) -> None:
+        """Draw an aircraft, from now on and without what was before."""
+        if aircraft.parameter_hash != self._scene.aircraft.parameter_hash:
+            self._scene.remove()
+            self._scene = Scene(self._server, aircraft, self._shown)
+            for column in self._columns:
+                column.remove()
+            self._columns = self._make_columns(aircraft)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._scene.clear_trail()
+        for column in self._columns:
+            column.history.clear()
+
+    # -------------------------------------------------------------------------------------------------------- frames
+
+    def draw(self, elapsed: float) -> None:
+        """Draw the next frame.
+
+        Parameters
+        ----------
+        elapsed : float
+            Wall time since the last one [s].
+        """
+        with self._lock:
+            live = self._live()
+            shown = live if self._recording is None else self._replayed(self._recording, elapsed)
+            if shown is None:
+                return
+            self._frames += 1
+            with self._server.atomic():
+                self._draw(shown)
+            if live is not None and self._frames % READOUT_EVERY == 0:
+                controls = pilot_controls(self._aircraft, live.snapshot.swashplate)
+                self._fly.update(controls, live.status.playing)
+
+    def _draw(self, shown: Live) -> None:
+        snapshot = shown.snapshot
+        self._scene.draw(snapshot, shown.lead)
+        for column in self._columns:
+            column.history.add(snapshot)
+        if self._frames % READOUT_EVERY == 0:
+            source = self._aircraft.name if self._recording is None else self._recording.path.name
+            self._readout.content = readout(self._scene.aircraft, snapshot, shown.status, source)
+        if self._frames % CHARTS_EVERY == 0:
+            for column in self._columns:
+                column.update()
+
+    def _replayed(self, recording: Recording, elapsed: float) -> Live:
+        """Instant of a log; the slider and the clock move it."""
+        rate = float(self._logs.rate.value)
+        if self._logs.moved:
+            self._logs.moved = False
+            self._place = float(self._logs.place.value)
+            self._forget()
+        elif self._logs.playing.value:
+            self._place = min(self._place + rate * elapsed, recording.end)
+            if self._frames % READOUT_EVERY == 0:
+                self._logs.place.value = round(self._place, 2)
+        playing = bool(self._logs.playing.value) and self._place < recording.end
+        return Live(recording.at(self._place), 0.0, Status(playing, rate if playing else 0.0))
+
+
+def _legend(scene: Scene) -> str:
+    """Scale of the inflow's colours and of the arrows."""
+    low, high = scene.inflow_range
+    stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in COLOURS)
+    arrows = (
+        (THRUST, "thrust of a rotor", f"1 m is {scene.newtons_per_metre:.0f} N"),
+        (MOMENT, "moment on its hub", f"1 m is {1 / ARROW_OF_MOMENT:.0f} N m"),
+        (PATH, "tip path", "flap as magnified"),
+    )
+    lines = "".join(
+        f'<div><span style="display:inline-block;width:14px;height:3px;vertical-align:middle;background:rgb{colour}">'
+        f'</span>&ensp;{name}, <span style="color:#5c6670">{scale}</span></div>'
+        for colour, name, scale in arrows
+    )
+    return (
+        f'<div style="font:12px sans-serif;padding:8px 10px;line-height:1.5">{lines}'
+        '<div style="margin-top:6px">induced velocity down through the disc [m/s]</div>'
+        f'<div style="height:10px;margin:3px 0;background:linear-gradient(to right,{stops})"></div>'
+        f'<div style="display:flex;justify-content:space-between"><span>{low:g}</span>'
+        f"<span>{(low + high) / 2:g}</span><span>{high:g}</span></div></div>"
+    )

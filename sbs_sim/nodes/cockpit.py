@@ -1,0 +1,162 @@
+"""Executable `cockpit`: a flight in the browser.
+
+Starts a simulator in a process of its own, so that drawing never takes the flight's time, or joins one that flies
+already. What is slow to import is imported when the command line is known to be right.
+"""
+
+import argparse
+import ctypes
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import rclpy.utilities
+
+from sbs_sim.errors import SbsError
+from sbs_sim.nodes.host import Component, run
+
+if TYPE_CHECKING:
+    from sbs_sim.nodes.cockpit_node import Cockpit
+
+HOST, PORT = "127.0.0.1", 8080
+DISCOVERY = 1.5  # s in which a simulator that flies already is found
+END_PATIENCE = 15.0  # s that a simulator may take to close its log
+START_HEIGHT = 10.0  # m above the origin, of a flight that the cockpit starts
+DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG
+
+
+class Simulator:
+    """A simulator in a process of its own, which ends with this one.
+
+    Parameters
+    ----------
+    ros_arguments : list of str
+        --ros-args and what follows; empty for none.
+    end : threading.Event
+        Set when the simulator has ended.
+    """
+
+    def __init__(self, ros_arguments: list[str], end: threading.Event) -> None:
+        path = Path(sys.argv[0]).resolve().with_name("simulator")
+        height = ["--ros-args", "-p", f"altitude:={START_HEIGHT}"]  # first: what the user says comes after
+        command = [sys.executable, str(path), *height, *ros_arguments[1:]]
+        # a session of its own: Ctrl-C comes to the cockpit, which ends the simulator when it has let go of it
+        self._process = subprocess.Popen(command, start_new_session=True, preexec_fn=_end_with_parent)
+        self._end = end
+        threading.Thread(target=self._watch, name="simulator", daemon=True).start()
+
+    def _watch(self) -> None:
+        self._process.wait()
+        self._end.set()
+
+    def stop(self) -> int:
+        """End it in good order; its exit code."""
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGINT)
+        try:
+            return self._process.wait(END_PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            return self._process.wait()
+
+
+def _end_with_parent() -> None:
+    """Have the kernel end this process when its parent has ended, however that came."""
+    ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGINT)
+
+
+class Start:
+    """What the command line asks for: a cockpit, and a simulator if there is to be one.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    ros_arguments : list of str
+    end : threading.Event
+        Set when there is nothing to show any more.
+    """
+
+    def __init__(self, options: argparse.Namespace, ros_arguments: list[str], end: threading.Event) -> None:
+        self._options, self._ros_arguments, self._end = options, ros_arguments, end
+        self._cockpit: Cockpit | None = None
+        self._simulator: Simulator | None = None
+
+    def nodes(self) -> list[Component]:
+        """Make everything.
+
+        Raises
+        ------
+        SbsError
+            The address is taken, or a simulator flies already.
+        """
+        host, port, attach = self._options.host, self._options.port, self._options.attach
+        check_address(host, port)
+        lookout, since = Component("cockpit_lookout"), time.monotonic()
+        from sbs_sim.nodes.cockpit_node import Cockpit  # meanwhile the lookout discovers others
+
+        try:
+            if not attach:
+                _refuse_second_simulator(lookout, since + DISCOVERY)
+                self._simulator = Simulator(self._ros_arguments, self._end)
+        finally:
+            lookout.destroy_node()
+        self._cockpit = Cockpit(host, port, self._end, pause=not attach)
+        return [self._cockpit]
+
+    def finish(self) -> int:
+        """End the simulator; the worst exit code."""
+        codes = [0 if self._simulator is None else self._simulator.stop()]
+        codes.append(int(self._cockpit is not None and self._cockpit.failed))
+        return max(codes, key=abs)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Serve the page until interrupted."""
+    arguments = sys.argv if args is None else args
+    own = rclpy.utilities.remove_ros_args(arguments)[1:]
+    options = _parse(own)
+    ros_arguments = arguments[1 + len(own) :]
+    end = threading.Event()
+    start = Start(options, ros_arguments, end)
+    code = run(start.nodes, [arguments[0], *ros_arguments], end)
+    sys.exit(start.finish() or code)
+
+
+def check_address(host: str, port: int) -> None:
+    """Raise SbsError if nothing can be served there."""
+    try:
+        with socket.create_server((host, port)):
+            return
+    except OSError as error:
+        raise SbsError(f"cannot serve on {host}:{port}: {error.strerror or error}; see --host and --port") from None
+
+
+def _parse(arguments: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="cockpit",
+        description="Fly in the browser: starts a simulator and serves a page that shows and steers it.",
+        epilog="What follows --ros-args goes to the simulator too: ./run cockpit --ros-args -p airspeed:=15.0",
+    )
+    parser.add_argument("--host", default=HOST, help=f"address to serve on (default: {HOST}, this machine only)")
+    parser.add_argument("--port", type=int, default=PORT, help=f"1 to 65535 (default: {PORT})")
+    parser.add_argument("--attach", action="store_true", help="join a simulator that flies already, start none")
+    options = parser.parse_args(arguments)
+    if not 1 <= options.port <= 65535:
+        parser.error(f"--port {options.port}: allowed are 1 to 65535")
+    if not options.host:
+        parser.error("--host is empty: allowed are names and addresses of this machine, 0.0.0.0 for all of them")
+    return options
+
+
+def _refuse_second_simulator(lookout: Component, until: float) -> None:
+    """Raise SbsError if a simulator is discovered whose topics this one would publish too."""
+    while not lookout.count_publishers("inflow"):
+        if (left := until - time.monotonic()) <= 0.0:
+            return
+        time.sleep(min(left, 0.05))
+    raise SbsError("a simulator is flying already: --attach joins it, another ROS_DOMAIN_ID keeps apart from it")

@@ -1,0 +1,157 @@
+"""A pilot who asks a simulator over ROS: the calls behind the buttons of the cockpit."""
+
+import math
+import threading
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+from std_srvs.srv import SetBool
+
+from sbs_msgs.msg import Controls
+from sbs_msgs.srv import Linearize, Reset, SetWind, Step, Trim
+from sbs_sim.analysis.trim import TrimCondition
+from sbs_sim.model.state import CONTROL_NAMES
+from sbs_sim.nodes.host import COMMAND_QOS
+
+Array = NDArray[np.float64]
+Answer = tuple[bool, str]
+
+PATIENCE = 10.0  # s for an answer
+ANALYSIS_PATIENCE = 60.0  # s for a trim or a linear model
+COMMAND_PERIOD = 0.1  # s between commands that hold the controls
+SERVICES = {
+    "pause": SetBool,
+    "step": Step,
+    "reset": Reset,
+    "set_wind": SetWind,
+    "trim": Trim,
+    "linearize": Linearize,
+    "simulator/set_parameters": SetParameters,
+    "simulator/get_parameters": GetParameters,
+}
+
+
+class RemotePilot:
+    """See `sbs_sim.cockpit.panels.Pilot`. The calls wait for their answers: they do not belong into callbacks of ROS.
+
+    Parameters
+    ----------
+    node : Node
+        Spun by another thread.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._clients = {name: node.create_client(kind, name) for name, kind in SERVICES.items()}
+        self._output = node.create_publisher(Controls, "controls", COMMAND_QOS)
+        self._held: Controls | None = None
+        node.create_timer(COMMAND_PERIOD, self._hold)
+
+    def _call(self, name: str, request: Any, patience: float = PATIENCE) -> Any:
+        """Response of a service; None if there is none in time."""
+        client = self._clients[name]
+        if not client.service_is_ready():
+            return None
+        answered = threading.Event()
+        future = client.call_async(request)
+        future.add_done_callback(lambda _: answered.set())
+        if not answered.wait(patience):
+            client.remove_pending_request(future)
+            return None
+        return future.result()
+
+    def _ask(self, name: str, request: Any, patience: float = PATIENCE) -> Answer:
+        response = self._call(name, request, patience)
+        return (False, f"no answer of {name}") if response is None else (response.success, response.message)
+
+    def _hold(self) -> None:
+        """Publish again what is held, so that it does not count as old."""
+        if self._held is not None:
+            self._output.publish(self._held)
+
+    def aircraft(self) -> str | None:
+        """Aircraft of the simulator, a name or a path; None while it does not answer."""
+        response = self._call("simulator/get_parameters", GetParameters.Request(names=["aircraft"]))
+        return None if response is None or not response.values else parameter_value_to_python(response.values[0])
+
+    def command(self, controls: Array | None) -> None:
+        """Hold pilot controls [rad], shape (4,), from now on; None lets go of them."""
+        held = None if controls is None else dict(zip(CONTROL_NAMES, controls.tolist(), strict=True))
+        self._held = None if held is None else Controls(**held)
+        self._hold()
+
+    def pause(self, paused: bool) -> Answer:
+        """Pause or go on."""
+        return self._ask("pause", SetBool.Request(data=paused))
+
+    def step(self, ticks: int) -> Answer:
+        """Fly some ticks while paused."""
+        return self._ask("step", Step.Request(ticks=ticks))
+
+    def reset(self, condition: TrimCondition, height: float) -> Answer:
+        """Put the aircraft into a trimmed condition at a height above the origin [m]."""
+        request = Reset.Request(**_condition(condition))
+        request.position.z = -float(height)
+        return self._ask("reset", request, ANALYSIS_PATIENCE)
+
+    def set_pace(self, factor: float) -> Answer:
+        """Simulation time over wall time; 0 is as fast as possible."""
+        parameter = Parameter("real_time_factor", value=float(factor)).to_parameter_msg()
+        response = self._call("simulator/set_parameters", SetParameters.Request(parameters=[parameter]))
+        if response is None:
+            return False, "no answer of simulator/set_parameters"
+        return response.results[0].successful, response.results[0].reason
+
+    def set_wind(self, velocity: Array, turbulence: float) -> Answer:
+        """Steady wind, NED [m/s], shape (3,), and standard deviation of turbulence in all directions [m/s]."""
+        request = SetWind.Request()
+        request.velocity.x, request.velocity.y, request.velocity.z = (float(value) for value in velocity)
+        intensity = request.turbulence_intensity
+        intensity.x = intensity.y = intensity.z = float(turbulence)
+        return self._ask("set_wind", request)
+
+    def trim(self, condition: TrimCondition) -> Answer:
+        """Trim a condition and tell the result."""
+        response = self._call("trim", Trim.Request(**_condition(condition)), ANALYSIS_PATIENCE)
+        if response is None:
+            return False, "no answer of trim: is there an analysis node?"
+        if not response.success:
+            return False, response.message
+        point = response.trim
+        angles = [math.degrees(getattr(point.controls, name)) for name in CONTROL_NAMES]
+        rows = [
+            *zip(("collective", "lateral", "longitudinal", "differential"), angles, strict=True),
+            ("pitch", math.degrees(point.pitch)),
+            ("roll", math.degrees(point.roll)),
+        ]
+        table = "\n".join(f"| {name} | {round(value, 3) + 0.0:.3f} | deg |" for name, value in rows)
+        return True, (
+            f"**Trim at {_words(condition)}**\n\n| | | |\n|---|--:|---|\n{table}\n| thrust | {point.thrust:.1f} | N |\n"
+            f"| power | {point.power:.0f} | W |\n" + "".join(f"\n{text}\n" for text in point.beyond_limits)
+        )
+
+    def linearize(self, condition: TrimCondition) -> Answer:
+        """Linearize about a condition; the model comes by `linear_model`."""
+        done, message = self._ask("linearize", Linearize.Request(**_condition(condition)), ANALYSIS_PATIENCE)
+        return done, f"Linear model at {_words(condition)}: see *Modes*" if done else message
+
+
+def _condition(condition: TrimCondition) -> dict[str, float]:
+    """Fields of a request."""
+    names = ("airspeed", "climb_rate", "sideslip", "turn_rate")
+    return {name: float(getattr(condition, name)) for name in names}
+
+
+def _words(condition: TrimCondition) -> str:
+    parts = [f"{condition.airspeed:g} m/s"]
+    for value, unit, name in (
+        (condition.climb_rate, "m/s", "climb"),
+        (math.degrees(condition.sideslip), "deg", "sideslip"),
+        (math.degrees(condition.turn_rate), "deg/s", "turn"),
+    ):
+        if value:
+            parts.append(f"{name} {value:.3g} {unit}")
+    return ", ".join(parts)

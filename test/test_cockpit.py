@@ -1,0 +1,439 @@
+"""The cockpit: what it draws, in numbers; the page in a real browser with a real simulator behind it."""
+
+import dataclasses
+import io
+import math
+import os
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import browser
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, environment, world
+
+from sbs_msgs.msg import BodyState, FlightEvent
+from sbs_sim import Aircraft, trim
+from sbs_sim.cockpit import geometry
+from sbs_sim.cockpit.charts import PERIOD, History, body_charts, pilot_controls, rotor_charts
+from sbs_sim.cockpit.playback import Recording, recordings
+from sbs_sim.cockpit.poles import Pole, pole_page
+from sbs_sim.cockpit.readouts import Status, condition_here, readout
+from sbs_sim.cockpit.scene import COLOURS, colour_of
+from sbs_sim.errors import RecordingError, SimulationError
+from sbs_sim.model import state as S
+from sbs_sim.model.frames import euler_to_quaternion
+from sbs_sim.model.multiblade import blade_matrix
+from sbs_sim.nodes.conversions import StateMessages, snapshot_of
+from sbs_sim.recording import read
+from sbs_sim.simulation import Simulation, trimmed_state
+
+ROOT = Path(__file__).resolve().parent.parent
+HOVER_STEP = ROOT / "bags" / "hover_step.mcap"
+AIRCRAFT = Aircraft.load("sbs")
+ROTORS = pytest.mark.parametrize("rotor", AIRCRAFT.rotors, ids=lambda rotor: rotor.name)
+ANGLES = st.floats(-0.3, 0.3)
+
+
+def snapshot_of_flight(airspeed=10.0, wind=(0.0, 0.0, 0.0), heading=0.0, **condition):
+    point = trim(AIRCRAFT, airspeed=airspeed, **condition)
+    state = trimmed_state(AIRCRAFT, point, (3.0, -4.0, -25.0), heading, wind)
+    simulation = Simulation(AIRCRAFT, state, point.swashplate)
+    return simulation.snapshot(), point
+
+
+def tip(rotor, azimuth, flap=0.0, lag=0.0):
+    hinges, axes = geometry.blade_poses(rotor, np.array([azimuth]), np.array([flap]), np.array([lag]))
+    return hinges[0] + rotor.blade_length * axes[0, :, 0]
+
+
+# --- blades -----------------------------------------------------------------------------------------------------
+
+
+@ROTORS
+def test_a_blade_at_azimuth_0_points_aft_and_reaches_the_radius(rotor):
+    np.testing.assert_allclose(tip(rotor, 0.0), rotor.hub + [-rotor.radius, 0.0, 0.0], atol=1e-12)
+
+
+@ROTORS
+def test_the_inner_blades_retreat(rotor):
+    # paper, Figure 1: both rotors' advancing blades, azimuth 90 deg, are the outer ones, and move forward there
+    advancing = tip(rotor, math.pi / 2)
+    assert abs(advancing[1]) == pytest.approx(abs(rotor.hub[1]) + rotor.radius)
+    assert (tip(rotor, math.pi / 2 + 1e-3) - advancing)[0] > 0.0
+
+
+@ROTORS
+@given(azimuth=st.floats(0.0, 6.28), flap=st.floats(0.01, 0.3), lag=st.floats(0.01, 0.3))
+def test_flap_is_up_and_lag_against_the_motion(rotor, azimuth, flap, lag):
+    rest, motion = tip(rotor, azimuth), tip(rotor, azimuth + 1e-4) - tip(rotor, azimuth)
+    assert (tip(rotor, azimuth, flap=flap) - rest)[2] == pytest.approx(-rotor.blade_length * math.sin(flap))
+    assert (tip(rotor, azimuth, lag=lag) - rest) @ motion < 0.0
+
+
+@ROTORS
+@given(azimuth=st.floats(0.0, 6.28), flap=ANGLES, lag=ANGLES)
+def test_the_axes_of_a_blade_are_a_rotation(rotor, azimuth, flap, lag):
+    _, axes = geometry.blade_poses(rotor, np.array([azimuth]), np.array([flap]), np.array([lag]))
+    np.testing.assert_allclose(axes[0] @ axes[0].T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes[0]) == pytest.approx(1.0)
+
+
+@ROTORS
+@given(turn=st.integers(0, 59), coordinates=st.tuples(ANGLES, ANGLES, ANGLES))
+def test_the_tips_go_along_the_tip_path(rotor, turn, coordinates):
+    path = geometry.tip_path(rotor, np.array(coordinates), 2.0, 60)
+    azimuth = 2 * math.pi * turn / 60
+    flap = blade_matrix(rotor.blades, azimuth) @ np.array(coordinates)
+    for k, own in enumerate(geometry.blade_azimuths(rotor, azimuth)):
+        np.testing.assert_allclose(path[(turn + 20 * k) % 60], tip(rotor, own, flap=2.0 * flap[k]), atol=1e-12)
+
+
+def test_a_disc_that_is_tilted_back_is_high_in_front():
+    path = geometry.tip_path(AIRCRAFT.rotors[0], np.array([0.0, math.radians(3.0), 0.0]), 1.0, 60)
+    foremost, aftmost = path[path[:, 0].argmax()], path[path[:, 0].argmin()]
+    assert foremost[2] < aftmost[2]  # z is down
+
+
+def test_inflow_over_the_disc():
+    # Inflow.msg: lambdac > 0 is more inflow aft (azimuth 0), lambdas > 0 more on the advancing side (pi / 2)
+    rotor = AIRCRAFT.rotors[0]
+    radius, azimuth = np.full(3, 0.5), np.array([0.0, math.pi / 2, math.pi])
+    found = geometry.inflow_velocity(rotor, np.array([0.05, 0.02, 0.01]), radius, azimuth)
+    np.testing.assert_allclose(found, 2400 * math.pi / 30 * 0.505 * np.array([0.055, 0.06, 0.045]))
+
+
+def test_colours_of_values_end_with_those_of_the_ends():
+    colours = colour_of(np.array([-1.0, 0.0, 5.0, 10.0, 99.0]), (0.0, 10.0))
+    np.testing.assert_array_equal(colours, COLOURS[[0, 0, 4, 8, 8]])
+
+
+# --- numbers ----------------------------------------------------------------------------------------------------
+
+
+def test_the_pilot_controls_come_back_from_the_swashplates():
+    controls = np.radians([8.0, 1.0, -2.0, 0.5])
+    np.testing.assert_allclose(pilot_controls(AIRCRAFT, AIRCRAFT.mix(controls)), controls, atol=1e-14)
+
+
+@pytest.mark.parametrize("wind", [(0.0, 0.0, 0.0), (4.0, -3.0, 0.5)])
+@pytest.mark.parametrize(
+    "condition",
+    [
+        {"airspeed": 15.0},
+        {"airspeed": 12.0, "climb_rate": 1.5, "sideslip": 0.2},
+        {"airspeed": 10.0, "turn_rate": 0.3},
+        {"airspeed": -5.0, "sideslip": 0.1},
+        {"airspeed": 0.0, "climb_rate": 1.0},
+    ],
+    ids=str,
+)
+def test_the_condition_here_is_the_one_that_was_trimmed(condition, wind):
+    snapshot, _ = snapshot_of_flight(wind=wind, heading=2.0, **condition)
+    here = condition_here(dataclasses.replace(snapshot, wind=np.array(wind)))
+    for name in ("airspeed", "climb_rate", "sideslip", "turn_rate"):
+        assert getattr(here, name) == pytest.approx(condition.get(name, 0.0), abs=0.006), name
+
+
+def test_the_readout_says_what_the_state_says():
+    snapshot, point = snapshot_of_flight(airspeed=10.0, heading=math.radians(30.0))
+    text = readout(AIRCRAFT, snapshot, Status(True, 0.98, 3, "blade lost", "bags/x.mcap"), "sbs")
+    for part in ("25.00", "10.00", "30.0", "0.98 × real time", "3 deadlines missed", "blade lost", "recording x.mcap"):
+        assert part in text
+    assert point.thrust.sum() == pytest.approx(20.62 * 9.80665, rel=0.05)
+
+
+def test_the_history_keeps_instants_apart_and_begins_anew_after_a_jump_back():
+    snapshot, _ = snapshot_of_flight()
+    history = History((*body_charts(AIRCRAFT), *rotor_charts(AIRCRAFT)))
+    assert len(history.table()) == 0
+    for k in range(100):
+        history.add(dataclasses.replace(snapshot, time=0.01 * k))
+    times = history.table()[:, 0]
+    assert np.diff(times[:-1]).min() >= 0.999 * PERIOD
+    assert times[-1] == 0.99  # the newest is there in any case: single steps are seen
+    history.add(dataclasses.replace(snapshot, time=0.2))
+    assert set(history.table()[:, 0]) == {0.2}
+
+
+def test_a_reset_of_a_paused_flight_is_seen():
+    snapshot, _ = snapshot_of_flight()
+    history = History(body_charts(AIRCRAFT))
+    history.add(snapshot)
+    moved = snapshot.state.copy()
+    moved[S.POSITION + 2] = -99.0
+    history.add(dataclasses.replace(snapshot, state=moved))
+    assert history.table()[-1, -1] == 99.0
+
+
+def test_charts_have_a_name_for_every_value():
+    snapshot, point = snapshot_of_flight()
+    for chart in (*body_charts(AIRCRAFT), *rotor_charts(AIRCRAFT)):
+        assert len(chart.values(snapshot)) == len(chart.names), chart.title
+    controls = next(chart for chart in body_charts(AIRCRAFT) if chart.title == "Controls")
+    np.testing.assert_allclose(controls.values(snapshot), np.degrees(point.controls), atol=1e-9)
+
+
+def test_the_pole_page_names_the_modes_and_tells_their_numbers():
+    # a phugoid that doubles in ln 2 / 0.1 = 6.93 s and a roll subsidence that halves in 0.231 s
+    page = pole_page([Pole("phugoid", complex(0.1, 0.5)), Pole("roll & co", complex(-3.0, 0.0))], "hover")
+    for part in ("phugoid", "roll &amp; co", "-0.20", "6.93", "0.231", "[rad/s]", "hover"):
+        assert part in page
+
+
+# --- messages and logs ------------------------------------------------------------------------------------------
+
+
+def test_a_snapshot_comes_back_from_its_messages():
+    snapshot, _ = snapshot_of_flight()
+    made = StateMessages(AIRCRAFT)
+    made.fill(snapshot)
+    again = snapshot_of(AIRCRAFT, made.state, made.rotors, made.inflow, snapshot.swashplate, snapshot.wind)
+    for name in ("time", "state", "acceleration", "azimuth", "loads", "swashplate", "wind"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(snapshot, name), err_msg=name)
+
+
+def test_messages_of_another_aircraft_are_refused():
+    snapshot, _ = snapshot_of_flight()
+    made = StateMessages(AIRCRAFT)
+    made.fill(snapshot)
+    tandem = Aircraft.load(ROOT / "test" / "data" / "tail_rotor.yaml")
+    with pytest.raises(SimulationError, match="blades"):
+        snapshot_of(tandem, made.state, made.rotors, made.inflow, snapshot.swashplate, snapshot.wind)
+
+
+def test_a_recording_gives_what_was_recorded():
+    log, recording = read(HOVER_STEP), Recording(HOVER_STEP)
+    state, rotors = log["state"], log["rotors"]
+    for i in (0, 57, len(state.time) - 1):
+        found = recording.at(state.time[i] + 0.004)  # of the 10 ms until the next one
+        assert found.time == pytest.approx(state.time[i])
+        assert -found.state[S.POSITION + 2] == -state["position.z"][i]
+        assert found.state[S.RATES] == state["angular_velocity.x"][i]
+        assert found.azimuth[1] == rotors["rotors[1].azimuth"][i]
+        assert found.loads[0, 0] == rotors["rotors[0].thrust"][i]
+    assert recording.at(-5.0).time == recording.beginning
+    assert recording.at(1e9).time == recording.end
+
+
+def test_a_recording_knows_the_controls_of_every_time():
+    # tools/make_hover_step.py: each control is raised by 0.5 deg for 0.3 s, one every 0.8 s from 0.5 s on
+    recording = Recording(HOVER_STEP)
+    rest = pilot_controls(AIRCRAFT, recording.at(0.3).swashplate)
+    for i in range(4):
+        step = pilot_controls(AIRCRAFT, recording.at(0.5 + 0.8 * i + 0.2).swashplate) - rest
+        np.testing.assert_allclose(np.degrees(step), 0.5 * np.eye(4)[i], atol=1e-6)
+
+
+def test_what_is_no_log_is_told_in_one_line(tmp_path):
+    (tmp_path / "a.mcap").write_bytes(b"nothing")
+    assert [path.name for path in recordings(tmp_path)] == ["a.mcap"]
+    assert recordings(tmp_path / "nowhere") == []
+    with pytest.raises(RecordingError, match=r"a\.mcap"):
+        Recording(tmp_path / "a.mcap")
+
+
+def test_euler_angles_of_the_charts():
+    snapshot, _ = snapshot_of_flight()
+    state = snapshot.state.copy()
+    state[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(math.radians(30), math.radians(20), math.radians(-10))
+    attitude = body_charts(AIRCRAFT)[0]
+    assert attitude.names == ("roll", "pitch", "yaw")
+    np.testing.assert_allclose(attitude.values(dataclasses.replace(snapshot, state=state)), [-10, 20, 30], atol=1e-9)
+
+
+# --- the executable ---------------------------------------------------------------------------------------------
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        return taken.getsockname()[1]
+
+
+def end_of_cockpit(*arguments, domain=0):
+    """Exit code and error lines of a cockpit that cannot start."""
+    command = [sys.executable, str(EXECUTABLES / "cockpit"), *arguments]
+    ended = subprocess.run(
+        command, env=environment(domain), capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+    return ended.returncode, ended.stderr.strip().splitlines()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--port", "0"], "--port 0: allowed are 1 to 65535"),
+        (["--port", "70000"], "--port 70000: allowed are 1 to 65535"),
+        (["--port", "x"], "--port: invalid int value: 'x'"),
+        (["--host", ""], "--host is empty"),
+        (["--fly"], "--fly"),
+    ],
+)
+def test_a_wrong_command_line_is_told(arguments, told):
+    code, lines = end_of_cockpit(*arguments)
+    assert code == 2
+    assert told in lines[-1]
+
+
+def test_a_port_that_is_taken_is_told_in_one_line():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        code, lines = end_of_cockpit("--port", str(port), domain=next(DOMAINS))
+    assert code == 1
+    assert len(lines) == 1
+    assert f"127.0.0.1:{port}" in lines[0]
+    assert "--port" in lines[0]
+
+
+def test_a_host_that_is_not_this_machine_is_told_in_one_line():
+    code, lines = end_of_cockpit("--host", "192.0.2.1", domain=next(DOMAINS))  # RFC 5737: nobody has it
+    assert code == 1
+    assert len(lines) == 1
+    assert "192.0.2.1" in lines[0]
+
+
+def test_a_wrong_parameter_of_the_simulator_ends_the_cockpit_with_its_line():
+    arguments = ("--port", str(free_port()), "--ros-args", "-p", "aircraft:=nonesuch")
+    code, lines = end_of_cockpit(*arguments, domain=next(DOMAINS))
+    assert code == 1
+    assert any("nonesuch" in line for line in lines)
+
+
+# --- in a browser -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def flying(tmp_path_factory):
+    """World with a cockpit that has started its own simulator; its process and its address."""
+    with world(next(DOMAINS), tmp_path_factory.mktemp("cockpit")) as made:
+        (made.folder / "bags").mkdir()
+        (made.folder / "bags" / "hover_step.mcap").write_bytes(HOVER_STEP.read_bytes())
+        port = free_port()
+        process = made.start("cockpit", arguments=["--port", str(port)])
+        made.client.watch("state", BodyState)
+        made.client.watch("events", FlightEvent, latched=True)
+        address = f"http://127.0.0.1:{port}"
+        made.client.until(lambda: f"cockpit: {address}" in process.output or not process.running, "the address")
+        assert process.running, process.output
+        yield made, process, address
+
+
+@pytest.fixture(scope="module")
+def page(flying):
+    if reason := browser.missing():
+        if os.environ.get("CI"):
+            pytest.fail(reason)
+        pytest.skip(reason)
+    with browser.page(flying[2]) as opened:
+        yield opened
+
+
+def button(page, name):
+    return page.get_by_role("button", name=name, exact=True)
+
+
+def test_the_flight_waits_paused_for_its_pilot(flying):
+    made, _, _ = flying
+    states = made.client.messages["state"]
+    made.client.until(lambda: states, "a state")
+    assert -states[-1].position.z == pytest.approx(10.0, abs=0.1)
+    before = len(states)
+    made.client.spin(0.5)
+    assert len(states) == before
+
+
+def test_a_second_simulator_is_refused_and_a_second_cockpit_can_join(flying):
+    made, _, _ = flying
+    code, lines = end_of_cockpit("--port", str(free_port()), domain=made.domain)
+    assert code == 1
+    assert "--attach" in lines[-1]
+    joined = made.start("cockpit", arguments=["--attach", "--port", str(free_port())])
+    made.client.until(lambda: "cockpit: http" in joined.output or not joined.running, "the second address")
+    assert joined.interrupt() == 0, joined.output
+
+
+def test_it_listens_on_this_machine_alone(flying):
+    _, _, address = flying
+    port = int(address.rpartition(":")[2])
+    listening = [line.split()[1] for line in Path("/proc/net/tcp").read_text().splitlines()[1:] if " 0A " in line]
+    assert [place for place in listening if int(place.split(":")[1], 16) == port] == [f"0100007F:{port:04X}"]
+
+
+def test_the_page_draws_the_aircraft(page):
+    canvas = page.locator("canvas").first
+    picture = Image.open(io.BytesIO(canvas.screenshot())).convert("RGB")
+    middle = np.asarray(picture).astype(int)[:, picture.width // 4 : 3 * picture.width // 4]
+    assert len(np.unique(middle.reshape(-1, 3), axis=0)) > 200
+    # the first blades are the only thing that is orange
+    red, green, blue = middle[..., 0], middle[..., 1], middle[..., 2]
+    assert ((red > 150) & (green > 60) & (green < 0.85 * red) & (blue < 0.5 * red)).sum() > 20
+
+
+def test_a_slider_moves_the_aircraft_and_reset_brings_it_back(flying, page):
+    made, _, _ = flying
+    button(page, "Play").click()
+    made.client.next("state")
+    slider = page.get_by_role("slider").first  # collective
+    slider.focus()
+    for _ in range(30):
+        slider.press("ArrowRight")
+    climbing = made.client.next("state", lambda state: -state.position.z > 10.5)
+    assert climbing.velocity.z < 0.0
+    button(page, "Reset").click()
+    made.client.next("events", lambda event: event.kind == FlightEvent.RESET)
+    made.client.next("state", lambda state: abs(-state.position.z - 10.0) < 0.1 and abs(state.velocity.z) < 0.1)
+
+
+def test_keys_fly(flying, page):
+    made, _, _ = flying
+    page.locator("body").press("l")
+    pushed = made.client.next("events", lambda event: event.kind == FlightEvent.SWASHPLATE)
+    made.client.next("events", lambda event: event.swashplate[1] > math.radians(0.05))
+    assert len(pushed.swashplate) == 6
+    button(page, "Reset").click()
+    made.client.next("events", lambda event: event.kind == FlightEvent.RESET)
+
+
+def test_linearize_here_shows_the_modes(page):
+    button(page, "Linearize here").click()
+    page.get_by_role("tab", name="Modes").click()
+    page.get_by_text("phugoid").first.wait_for(timeout=1e3 * PATIENCE)
+    page.get_by_role("tab", name="Body").click()
+
+
+def test_a_log_is_replayed_in_the_same_view(page):
+    page.get_by_role("tab", name="Logs").click()
+    page.get_by_label("Source").click()
+    page.get_by_role("option", name="hover_step.mcap").click()
+    page.get_by_text("hover_step.mcap paused").wait_for(timeout=1e3 * PATIENCE)  # at its end after four seconds
+    times = page.get_by_role("row", name="time").first.inner_text().split()
+    assert float(times[1]) == pytest.approx(Recording(HOVER_STEP).end, abs=0.02)
+
+
+def test_a_log_that_is_none_is_refused_and_the_view_stays(flying, page):
+    made, _, _ = flying
+    (made.folder / "bags" / "broken.mcap").write_bytes(b"nothing")
+    button(page, "Look for new logs").click()
+    page.get_by_label("Source").click()
+    page.get_by_role("option", name="broken.mcap").click()
+    page.get_by_text("Log refused").wait_for(timeout=1e3 * PATIENCE)
+    assert page.get_by_text("hover_step.mcap paused").count() == 1
+
+
+def test_its_end_is_the_simulators_end(flying):
+    made, process, _ = flying
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    assert children
+    assert process.interrupt() == 0, process.output
+    deadline = time.monotonic() + PATIENCE
+    while any(Path(f"/proc/{child}").exists() for child in children) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(Path(f"/proc/{child}").exists() for child in children)
+    [log] = (made.folder / "bags").glob("*_sbs.mcap")
+    assert read(log).complete

@@ -47,3 +47,7 @@ class SweepError(SbsError):
 
 class ExportError(SbsError):
     """A file that cannot be written."""
+
+
+class PilotError(SbsError):
+    """A controller that cannot be designed, or a target or stick that it cannot take."""

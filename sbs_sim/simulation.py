@@ -504,7 +504,7 @@ def simulate(
         snapshots.append(simulation.snapshot())
         if i < ticks:
             simulation.advance()
-    return _histories(aircraft, snapshots, given)
+    return histories(aircraft, snapshots, given)
 
 
 def _command(controls: ArrayLike | Callable[[float], ArrayLike]) -> Callable[[int, float], Array]:
@@ -529,7 +529,8 @@ def _four(values: ArrayLike) -> Array:
     return array
 
 
-def _histories(aircraft: Aircraft, snapshots: list[Snapshot], given: list[Array]) -> dict[str, Array]:
+def histories(aircraft: Aircraft, snapshots: list[Snapshot], given: list[Array]) -> dict[str, Array]:
+    """Arrays by name, see `simulate`, of as many snapshots as pilot controls [rad], each shape (4,)."""
     states = np.array([snapshot.state for snapshot in snapshots])
     loads = np.array([snapshot.loads for snapshot in snapshots])
     speeds = np.array([rotor.speed for rotor in aircraft.rotors])

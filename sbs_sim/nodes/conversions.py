@@ -60,6 +60,11 @@ def to_time(seconds: float) -> Time:
     return Time(sec=nanoseconds // 1_000_000_000, nanosec=nanoseconds % 1_000_000_000)
 
 
+def to_seconds(stamp: Time) -> float:
+    """Simulation time [s] of a ROS time."""
+    return stamp.sec + stamp.nanosec * 1e-9
+
+
 def controls_array(message: Controls) -> Array:
     """Pilot controls [rad], shape (4,)."""
     return np.array([getattr(message, name) for name in S.CONTROL_NAMES])
@@ -128,8 +133,8 @@ def _triple(vector: Vector3 | Point) -> tuple[float, float, float]:
     return vector.x, vector.y, vector.z
 
 
-def point_array(point: Point) -> Array:
-    """Components of a point, shape (3,)."""
+def point_array(point: Point | Vector3) -> Array:
+    """Components of a point or vector, shape (3,)."""
     return np.array(_triple(point))
 
 

@@ -34,6 +34,14 @@ def analysis() -> None:
     main()
 
 
+def hover_hold() -> None:
+    """Run the executable `hover_hold`."""
+    _end_at_once_when_interrupted()
+    from sbs_sim.nodes.hover_hold import main
+
+    main()
+
+
 def replay() -> None:
     """Run the executable `replay`."""
     from sbs_sim.nodes.replay import main

@@ -40,6 +40,8 @@ setup(
             "control_mixer = sbs_sim.nodes.executables:control_mixer",
             "analysis = sbs_sim.nodes.executables:analysis",
             "hover_hold = sbs_sim.nodes.executables:hover_hold",
+            "teleop = sbs_sim.nodes.executables:teleop",
+            "joystick = sbs_sim.nodes.executables:joystick",
             "replay = sbs_sim.nodes.executables:replay",
             "trim = sbs_sim.commands.trim:main",
             "linearize = sbs_sim.commands.linearize:main",

@@ -454,10 +454,10 @@ def test_nodes_yaml_holds_the_defaults_of_every_parameter():
     from ruamel.yaml import YAML
 
     from sbs_sim.aircraft import config_folder
-    from sbs_sim.nodes import analysis, control_mixer, hover_hold, simulator
+    from sbs_sim.nodes import analysis, control_mixer, hover_hold, joystick, simulator, teleop
 
     written = YAML(typ="safe").load((config_folder() / "nodes.yaml").read_text())
-    modules = (simulator, control_mixer, analysis, hover_hold)
+    modules = (simulator, control_mixer, analysis, hover_hold, teleop, joystick)
     for module in modules:
         name = module.__name__.rpartition(".")[2]
         declared = {key: parameter.default for key, parameter in module.PARAMETERS.items()}

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-EXECUTABLES = "simulator control_mixer analysis hover_hold replay trim linearize sweep reproduce gusts plot"
+EXECUTABLES = (
+    "simulator control_mixer analysis hover_hold teleop joystick replay trim linearize sweep reproduce gusts plot"
+)
 
 # What the script itself calls; everything else is taken away from it.
 SCRIPT_TOOLS = (

@@ -70,11 +70,15 @@ def _limit(text: str) -> tuple[str, float]:
 def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.analysis import export
     from sbs_sim.analysis.linearize import linearize
+    from sbs_sim.pilot.flight import MOST_DELAY
     from sbs_sim.pilot.hover_hold import HoverModel, design
 
+    if not 0 <= arguments.delay <= MOST_DELAY:
+        raise UsageError(f"--delay {arguments.delay}: allowed are 0 to {MOST_DELAY} ticks")
     if not 1.0 <= arguments.duration <= LONGEST:
         raise UsageError(f"--duration {arguments.duration:g}: allowed are 1 to {LONGEST:g} s")
     export.check_target(arguments.json)
+    airs = _airs(arguments)
     craft = aircraft(arguments)
     model = linearize(craft)
     found = design(HoverModel.of(model), dict(arguments.limit))
@@ -82,7 +86,7 @@ def _work(arguments: argparse.Namespace) -> None:
     print("\n".join(found.describe()))
     results = {
         name: _figures(_flown(craft, model, found, air, settling + duration, arguments.delay), settling)
-        for name, (air, settling, duration) in _airs(arguments).items()
+        for name, (air, settling, duration) in airs.items()
     }
     _print(results)
     if arguments.json:

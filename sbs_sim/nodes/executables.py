@@ -42,6 +42,22 @@ def hover_hold() -> None:
     main()
 
 
+def teleop() -> None:
+    """Run the executable `teleop`."""
+    _end_at_once_when_interrupted()
+    from sbs_sim.nodes.teleop import main
+
+    main()
+
+
+def joystick() -> None:
+    """Run the executable `joystick`."""
+    _end_at_once_when_interrupted()
+    from sbs_sim.nodes.joystick import main
+
+    main()
+
+
 def replay() -> None:
     """Run the executable `replay`."""
     from sbs_sim.nodes.replay import main

@@ -16,6 +16,8 @@ from sbs_sim.simulation import Simulation, histories, trimmed_state
 
 Array = NDArray[np.float64]
 
+MOST_DELAY = 100  # ticks
+
 
 def fly(
     aircraft: Aircraft,
@@ -58,8 +60,8 @@ def fly(
     SimulationError
         See `Simulation`, `Mixer.set_target`.
     """
-    if not 0 <= delay <= 100:
-        raise PilotError(f"delay = {delay}: allowed are 0 to 100 ticks")
+    if not 0 <= delay <= MOST_DELAY:
+        raise PilotError(f"delay = {delay}: allowed are 0 to {MOST_DELAY} ticks")
     mixer = Mixer(aircraft)
     waiting: collections.deque[Array] = collections.deque()
     if isinstance(start, TrimPoint):

@@ -284,9 +284,7 @@ class HoverHold:
         PilotError
             A value that is not finite; nothing has changed then.
         """
-        values = np.asarray(body, dtype=float)[: S.BODY_SIZE]
-        if not (np.all(np.isfinite(values)) and math.isfinite(time)):
-            raise PilotError(f"state {values.tolist()} at {time}: allowed are finite numbers")
+        values = checked_body(time, body)
         heading, pitch, roll = quaternion_to_euler(values[S.ATTITUDE : S.VELOCITY])
         if self._time is not None and time < self._time:
             self.restart()
@@ -326,6 +324,20 @@ class HoverHold:
         high, around = max(1.0, abs(error[2]) / REACH), max(1.0, abs(turn) / TURN_REACH)
         share = np.array([far, far, high, around])
         return np.append(error, turn) / share, share == 1.0
+
+
+def checked_body(time: float, body: ArrayLike) -> Array:
+    """Position, attitude, velocity and rates, shape (13,): the first part of a simulation state, if it is finite.
+
+    Raises
+    ------
+    PilotError
+        It is not, or the time [s] is not.
+    """
+    values = np.asarray(body, dtype=float)[: S.BODY_SIZE]
+    if not (np.all(np.isfinite(values)) and math.isfinite(time)):
+        raise PilotError(f"state {values.tolist()} at {time}: allowed are finite numbers")
+    return values
 
 
 def _turned(heading: float, values: Array) -> Array:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim import config_file
 from sbs_sim.aircraft_values import places, replaced, separate, value_at
 from sbs_sim.errors import AircraftError, AirfoilError
 from sbs_sim.model import params as P
@@ -27,13 +28,6 @@ Array = NDArray[np.float64]
 Range = tuple[float, float]
 
 # what a schema calls its types, in words
-TYPE_WORDS = {
-    "number": "a number",
-    "integer": "a whole number",
-    "string": "a text",
-    "array": "a list",
-    "object": "a mapping of keys to values",
-}
 
 
 @dataclass(frozen=True)
@@ -203,8 +197,8 @@ class Aircraft:
         """
         path = _find(path_or_name, "aircraft", ".yaml", Path())
         try:
-            return cls.from_dict(_read_yaml(path), path.parent)
-        except AircraftError as error:
+            return cls.from_dict(config_file.read_yaml(path), path.parent)
+        except (AircraftError, config_file.UnreadableError) as error:
             raise AircraftError(f"{path}: {error}") from None
 
     @classmethod
@@ -286,7 +280,7 @@ class Aircraft:
             return self._made_of(data, self.folder, self)
         except AircraftError as error:
             named = str(error).startswith(f"{path} = ")
-            raise AircraftError(f"{error}" if named else f"{path} = {_short(value)}: {error}") from None
+            raise AircraftError(f"{error}" if named else f"{path} = {config_file.short(value)}: {error}") from None
 
     @cached_property
     def layout(self) -> StateLayout:
@@ -444,15 +438,6 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def _read_yaml(path: Path) -> Any:
-    from ruamel.yaml import YAML  # here, because it is slow to import and needed once
-
-    try:
-        return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
-    except Exception as error:  # the parser lets out all kinds: for "!!int x", a 31st of June, deep nesting
-        raise AircraftError("not readable as YAML: " + " ".join(str(error).split())) from None
-
-
 @cache
 def _schema() -> dict[str, Any]:
     return dict(json.loads((config_folder() / "aircraft.schema.json").read_text(encoding="utf-8")))
@@ -467,56 +452,9 @@ def _validator() -> Any:
 
 def _check_schema(data: Any) -> None:
     """Raise AircraftError with all that is wrong with keys, types and plain ranges."""
-    errors = sorted(_validator().iter_errors(data), key=lambda error: list(map(str, error.path)))
-    # only data that the schema accepts have a structure that is known, in which the search comes to an end
-    problems = [_explain(error) for error in errors] or [
-        f"{path} = {value}: allowed is a finite number" for path, value in _not_finite(data, "")
-    ]
+    problems = config_file.problems(data, _validator())
     if problems:
-        raise AircraftError("; ".join(dict.fromkeys(problems)))
-
-
-def _not_finite(data: Any, path: str) -> list[tuple[str, float]]:
-    if isinstance(data, dict):
-        return [item for key, value in data.items() for item in _not_finite(value, f"{path}.{key}".lstrip("."))]
-    if isinstance(data, list):
-        return [item for i, value in enumerate(data) for item in _not_finite(value, f"{path}[{i}]")]
-    return [(path, data)] if isinstance(data, float) and not math.isfinite(data) else []
-
-
-def _explain(error: Any) -> str:
-    """One schema error as "path = value: what is allowed"."""
-    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error.absolute_path)
-    path = path.lstrip(".")
-    rule, limit, value = error.validator, error.validator_value, error.instance
-    if rule == "additionalProperties":
-        known = error.schema["properties"]
-        unknown = [_key(key) for key in value if key not in known]
-        where = ", ".join(f"{path}.{key}".lstrip(".") for key in unknown)
-        return f"{where}: unknown key, allowed are {', '.join(known)}"
-    if rule == "required":
-        missing = [key for key in limit if key not in value]
-        return f"{', '.join(f'{path}.{key}'.lstrip('.') for key in missing)}: missing key"
-    allowed = {
-        "type": TYPE_WORDS.get(str(limit), f"of type {limit}"),
-        "enum": "one of " + ", ".join(map(str, limit)) if rule == "enum" else "",
-        "minimum": f">= {limit}",
-        "maximum": f"<= {limit}",
-        "exclusiveMinimum": f"> {limit}",
-        "minItems": f"a list of at least {limit}",
-        "maxItems": f"a list of at most {limit}",
-        "minLength": "a text that is not empty",
-    }.get(rule, error.message)
-    return f"{path or 'file'} = {_short(value)}: allowed is {allowed}"
-
-
-def _key(key: Any) -> str:
-    return key if isinstance(key, str) and key.isprintable() else _short(key)
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+        raise AircraftError("; ".join(problems))
 
 
 def _rotor(entry: dict[str, Any]) -> Rotor:

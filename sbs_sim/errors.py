@@ -55,3 +55,7 @@ class ClusterError(SbsError):
 
 class ExportError(SbsError):
     """A file that cannot be written."""
+
+
+class PilotError(SbsError):
+    """A controller that cannot be designed, or a target or stick that it cannot take."""

@@ -700,6 +700,12 @@ def _four(values: ArrayLike) -> Array:
     return array
 
 
+def histories(aircraft: Aircraft, snapshots: Sequence[Snapshot], given: Sequence[Array]) -> dict[str, Array]:
+    """Arrays by name, see `simulate`, of as many snapshots as pilot controls [rad], each shape (4,)."""
+    rows = Rows(**{field.name: np.array([getattr(one, field.name) for one in snapshots]) for field in fields(Rows)})
+    return _histories(aircraft, [(rows, np.array(given))], True)
+
+
 def _histories(aircraft: Aircraft, blocks: Sequence[tuple[Rows, Array]], loaded: bool) -> dict[str, Array]:
     states = np.concatenate([rows.state for rows, _ in blocks])
     named = {name: states[:, i] for i, name in enumerate(aircraft.layout.names)}

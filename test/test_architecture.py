@@ -68,13 +68,15 @@ ALLOWED = {
     "sbs_sim.errors": [],
     "sbs_sim.model": ["sbs_sim.model", "sbs_sim.errors"],
     "sbs_sim.aircraft_values": ["sbs_sim.errors"],
-    "sbs_sim.aircraft": ["sbs_sim.aircraft_values", "sbs_sim.model", "sbs_sim.errors"],
+    "sbs_sim.config_file": ["sbs_sim.errors"],
+    "sbs_sim.aircraft": ["sbs_sim.aircraft_values", "sbs_sim.config_file", "sbs_sim.model", "sbs_sim.errors"],
     "sbs_sim.mixer": ["sbs_sim.aircraft", "sbs_sim.model", "sbs_sim.errors"],
 }
 FORBIDDEN = {
     "sbs_sim.analysis": ["sbs_sim.nodes", "sbs_sim.recording", "sbs_sim.flight_loop"],
     "sbs_sim.recording": ["sbs_sim.nodes"],
-    "sbs_sim.simulation": ["sbs_sim.nodes", "sbs_sim.recording", "sbs_sim.flight_loop"],
+    "sbs_sim.pilot": ["sbs_sim.nodes", "sbs_sim.recording", "sbs_sim.flight_loop"],
+    "sbs_sim.simulation": ["sbs_sim.nodes", "sbs_sim.pilot", "sbs_sim.recording", "sbs_sim.flight_loop"],
     "sbs_sim": ["sbs_sim.nodes"],  # everything, where the rule begins with a module's own package
 }
 

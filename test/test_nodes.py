@@ -454,10 +454,12 @@ def test_nodes_yaml_holds_the_defaults_of_every_parameter():
     from ruamel.yaml import YAML
 
     from sbs_sim.aircraft import config_folder
-    from sbs_sim.nodes import analysis, control_mixer, simulator
+    from sbs_sim.nodes import analysis, control_mixer, hover_hold, joystick, simulator, teleop
 
     written = YAML(typ="safe").load((config_folder() / "nodes.yaml").read_text())
-    for name, module in (("simulator", simulator), ("control_mixer", control_mixer), ("analysis", analysis)):
+    modules = (simulator, control_mixer, analysis, hover_hold, teleop, joystick)
+    for module in modules:
+        name = module.__name__.rpartition(".")[2]
         declared = {key: parameter.default for key, parameter in module.PARAMETERS.items()}
         assert written[name]["ros__parameters"] == declared
 

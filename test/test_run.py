@@ -11,7 +11,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-EXECUTABLES = "simulator control_mixer analysis replay trim linearize sweep batch reproduce plot"
+EXECUTABLES = (
+    "simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep batch reproduce gusts"
+    " plot"
+)
 
 # What the script itself calls; everything else is taken away from it.
 SCRIPT_TOOLS = (

@@ -139,17 +139,12 @@ class LinearModel:
             raise LinearizationError(f"kept = {missing[0]}: allowed are {', '.join(self.state_names)}")
         slow = [self.state_names.index(name) for name in kept]
         fast = [i for i in range(len(self.state_names)) if i not in slow]
-        try:
-            settled = -np.linalg.solve(self.a[np.ix_(fast, fast)], np.hstack([self.a[fast][:, slow], self.b[fast]]))
-        except np.linalg.LinAlgError:
-            raise LinearizationError("the states that are not kept do not settle: their matrix is singular") from None
-        by_state, by_control = settled[:, : len(slow)], settled[:, len(slow) :]
-        coupling = self.a[np.ix_(slow, fast)]
+        reduced_a, reduced_b, by_state, by_control = settle(self.a, self.b, slow)
         controls = np.arange(len(self.control_names)) + len(self.state_names)
         return replace(
             self,
-            a=self.a[np.ix_(slow, slow)] + coupling @ by_state,
-            b=self.b[slow] + coupling @ by_control,
+            a=reduced_a,
+            b=reduced_b,
             c=self.c[:, slow] + self.c[:, fast] @ by_state,
             d=self.d + self.c[:, fast] @ by_control,
             state_names=tuple(kept),
@@ -273,6 +268,38 @@ def linearize(
 
     built = blocks(aircraft, point, difference_steps(aircraft, step_scale))
     return replace(model, method="paper", a=built["A"], b=built["B"], blocks=built)
+
+
+def settle(a: Array, b: Array, slow: Sequence[int]) -> tuple[Array, Array, Array, Array]:
+    """Take it that all states but the slow ones have settled (theory.md eq. 9.3).
+
+    Parameters
+    ----------
+    a : ndarray, shape (n, n)
+    b : ndarray, shape (n, m)
+    slow : sequence of int
+        Places of the s states that are kept, in the order of the result.
+
+    Returns
+    -------
+    a, b : ndarray, shape (s, s) and (s, m)
+        Of the slow states alone.
+    by_state, by_control : ndarray, shape (n - s, s) and (n - s, m)
+        The settled states are by_state @ slow states + by_control @ controls.
+
+    Raises
+    ------
+    LinearizationError
+        They do not settle: their matrix is singular.
+    """
+    fast = [i for i in range(len(a)) if i not in slow]
+    try:
+        settled = -np.asarray(np.linalg.solve(a[np.ix_(fast, fast)], np.hstack([a[fast][:, slow], b[fast]])), float)
+    except np.linalg.LinAlgError:
+        raise LinearizationError("the states that are not kept do not settle: their matrix is singular") from None
+    by_state, by_control = settled[:, : len(slow)], settled[:, len(slow) :]
+    coupling = a[np.ix_(slow, fast)]
+    return a[np.ix_(slow, slow)] + coupling @ by_state, b[slow] + coupling @ by_control, by_state, by_control
 
 
 def difference_steps(aircraft: Aircraft, scale: float = 1.0) -> Array:

@@ -64,8 +64,8 @@ def _behave_on_a_terminal() -> None:
 # --- arguments --------------------------------------------------------------------------------------------------
 
 
-def add_flight_arguments(parser: argparse.ArgumentParser) -> None:
-    """Aircraft, flight condition and fidelity."""
+def add_aircraft_arguments(parser: argparse.ArgumentParser) -> None:
+    """Aircraft and changes of it."""
     group = parser.add_argument_group("aircraft")
     group.add_argument("--aircraft", default="sbs", metavar="NAME", help="name or file (default: sbs)")
     group.add_argument(
@@ -77,6 +77,11 @@ def add_flight_arguments(parser: argparse.ArgumentParser) -> None:
         help="change a value of the aircraft file: body.mass=25, rotors.radius=0.5 (of every rotor),"
         " rotors.MR1.hub[0]=0.01; may be given several times",
     )
+
+
+def add_flight_arguments(parser: argparse.ArgumentParser) -> None:
+    """Aircraft, flight condition and fidelity."""
+    add_aircraft_arguments(parser)
     group = parser.add_argument_group("flight condition, relative to the air")
     for name, unit, meaning in (
         ("--airspeed", "m/s", "horizontal, negative is backwards"),

@@ -134,8 +134,8 @@ def _triple(vector: Vector3 | Point) -> tuple[float, float, float]:
     return vector.x, vector.y, vector.z
 
 
-def point_array(point: Point) -> Array:
-    """Components of a point, shape (3,)."""
+def point_array(point: Point | Vector3) -> Array:
+    """Components of a point or vector, shape (3,)."""
     return np.array(_triple(point))
 
 

@@ -35,6 +35,30 @@ def analysis() -> None:
     main()
 
 
+def hover_hold() -> None:
+    """Run the executable `hover_hold`."""
+    _end_at_once_when_interrupted()
+    from sbs_sim.nodes.hover_hold import main
+
+    main()
+
+
+def teleop() -> None:
+    """Run the executable `teleop`."""
+    _end_at_once_when_interrupted()
+    from sbs_sim.nodes.teleop import main
+
+    main()
+
+
+def joystick() -> None:
+    """Run the executable `joystick`."""
+    _end_at_once_when_interrupted()
+    from sbs_sim.nodes.joystick import main
+
+    main()
+
+
 def replay() -> None:
     """Run the executable `replay`."""
     _end_at_once_when_interrupted(INTERRUPTED)

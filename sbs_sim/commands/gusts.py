@@ -1,0 +1,154 @@
+"""`gusts`: the hover hold, and how it holds its place in turbulence and gusts."""
+
+import argparse
+import math
+from typing import TYPE_CHECKING, Any
+
+from sbs_sim.commands.common import DEGREES, UsageError, add_aircraft_arguments, aircraft, execute, fixed, print_table
+
+if TYPE_CHECKING:
+    from sbs_sim.aircraft import Aircraft
+    from sbs_sim.analysis.linearize import LinearModel
+    from sbs_sim.model.wind import Wind
+    from sbs_sim.pilot.hover_hold import HoverHoldDesign
+
+GUST_DELAY, AFTER_GUST = 1.0, 12.0  # s before a gust, and after it
+SETTLING = 10.0  # s, in which the integrals learn the steady wind; not in the figures
+LEAST_TURBULENCE_AIRSPEED = 1.0  # m/s at which the frozen field passes where there is no wind
+PLACE = ("north", "east", "down")
+LONGEST = 3600.0  # s
+
+
+def main() -> int:
+    """Executable `gusts`."""
+    return execute(_parser(), _work)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gusts",
+        description="Design the hover hold, print its gains, poles and margins, and fly it in turbulence and in"
+        " 1-cosine gusts, with the nonlinear model.",
+    )
+    add_aircraft_arguments(parser)
+    group = parser.add_argument_group("air")
+    for name, default, meaning in (
+        ("--wind", 4.0, "steady wind from ahead [m/s]"),
+        ("--turbulence", 1.5, "standard deviation of the Dryden turbulence, of each component [m/s]"),
+        ("--length", 50.0, "its scale length [m]"),
+        ("--gust", 5.0, "peak of the gusts: from ahead, from the left, from above [m/s]"),
+        ("--gust-duration", 2.0, "their length [s]"),
+    ):
+        group.add_argument(name, type=float, default=default, metavar="X", help=f"{meaning} (default: {default:g})")
+    group.add_argument("--seed", type=int, default=0, metavar="N", help="of the turbulence (default: 0)")
+    group = parser.add_argument_group("flight")
+    group.add_argument(
+        "--duration", type=float, default=60.0, metavar="T", help="flight in turbulence [s] (default: 60)"
+    )
+    group.add_argument("--delay", type=int, default=0, metavar="N", help="ticks that controls come late (default: 0)")
+    group.add_argument(
+        "--limit",
+        action="append",
+        default=[],
+        type=_limit,
+        metavar="NAME=VALUE",
+        help="departure that costs as much as any other at its limit, such as forward=0.3 [m, s, rad];"
+        " may be given several times",
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the results")
+    return parser
+
+
+def _limit(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: allowed is NAME=VALUE, for example forward=0.3") from None
+
+
+def _work(arguments: argparse.Namespace) -> None:
+    from sbs_sim.analysis import export
+    from sbs_sim.analysis.linearize import linearize
+    from sbs_sim.pilot.flight import MOST_DELAY
+    from sbs_sim.pilot.hover_hold import HoverModel, design
+
+    if not 0 <= arguments.delay <= MOST_DELAY:
+        raise UsageError(f"--delay {arguments.delay}: allowed are 0 to {MOST_DELAY} ticks")
+    if not 1.0 <= arguments.duration <= LONGEST:
+        raise UsageError(f"--duration {arguments.duration:g}: allowed are 1 to {LONGEST:g} s")
+    export.check_target(arguments.json)
+    airs = _airs(arguments)
+    craft = aircraft(arguments)
+    model = linearize(craft)
+    found = design(HoverModel.of(model), dict(arguments.limit))
+    print(f"hover hold of {craft.name}")
+    print("\n".join(found.describe()))
+    results = {
+        name: _figures(_flown(craft, model, found, air, settling + duration, arguments.delay), settling)
+        for name, (air, settling, duration) in airs.items()
+    }
+    _print(results)
+    if arguments.json:
+        export.write(arguments.json, export.to_json(results))
+
+
+def _airs(arguments: argparse.Namespace) -> dict[str, tuple["Wind", float, float]]:
+    """What is flown in, for how long before figures are taken, and for how long with them [s]."""
+    from sbs_sim.model.wind import Wind
+
+    turbulence = Wind(
+        velocity=(-arguments.wind, 0.0, 0.0),
+        turbulence_intensity=(arguments.turbulence,) * 3,
+        turbulence_length=arguments.length,
+        turbulence_airspeed=max(abs(arguments.wind), LEAST_TURBULENCE_AIRSPEED),
+        turbulence_seed=arguments.seed,
+    )
+    airs = {f"turbulence {arguments.turbulence:g} m/s": (turbulence, SETTLING, arguments.duration)}
+    size = arguments.gust
+    for name, peak in (("ahead", (-size, 0.0, 0.0)), ("left", (0.0, size, 0.0)), ("above", (0.0, 0.0, size))):
+        gust = Wind(gust=peak, gust_delay=GUST_DELAY, gust_duration=arguments.gust_duration)
+        airs[f"gust {size:g} m/s, {name}"] = (gust, 0.0, GUST_DELAY + arguments.gust_duration + AFTER_GUST)
+    return airs
+
+
+def _flown(
+    craft: "Aircraft", model: "LinearModel", found: "HoverHoldDesign", air: "Wind", duration: float, delay: int
+) -> Any:
+    from sbs_sim.pilot.flight import fly
+    from sbs_sim.pilot.hover_hold import HoverHold
+
+    return fly(craft, model.trim, HoverHold(found).controls, duration, wind=air, delay=delay)
+
+
+def _figures(flight: Any, settling: float) -> dict[str, float]:
+    """Errors of place [m] and heading [rad], and the motion of the controls [rad], from a time [s] on."""
+    import numpy as np
+
+    from sbs_sim.model.state import CONTROL_NAMES
+
+    used = flight["time"] >= settling
+    error = np.stack([flight[name][used] for name in PLACE])
+    distance = np.linalg.norm(error, axis=0)
+    w, x, y, z = (flight[name][used] for name in ("qw", "qx", "qy", "qz"))
+    heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))  # as quaternion_to_euler
+    figures = {f"rms_{name}": _rms(row) for name, row in zip(PLACE, error, strict=True)}
+    figures |= {"rms_distance": _rms(distance), "largest_distance": float(distance.max())}
+    figures |= {"rms_heading": _rms(heading)}
+    spread = flight["controls"][used].std(axis=0)
+    return figures | {f"std_{name}": float(value) for name, value in zip(CONTROL_NAMES, spread, strict=True)}
+
+
+def _rms(values: Any) -> float:
+    return math.sqrt(float((values**2).mean()))
+
+
+def _print(results: dict[str, dict[str, float]]) -> None:
+    print("\nerror of position [m], RMS, and of heading [deg], RMS; standard deviation of the controls [deg]")
+    headings = ["", *PLACE, "all", "largest", "heading", "coll.", "lat.", "long.", "diff."]
+    rows = []
+    for name, figures in results.items():
+        values = list(figures.values())
+        in_degrees = [DEGREES * value for value in values[5:]]
+        rows.append([name, *(fixed(value, 3) for value in values[:5]), *(fixed(value, 2) for value in in_degrees)])
+    print_table(headings, rows)

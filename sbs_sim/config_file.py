@@ -1,0 +1,101 @@
+"""Configuration files: YAML that a JSON schema describes, and what is wrong with one in words."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from sbs_sim.errors import SbsError
+
+TYPE_WORDS = {
+    "number": "a number",
+    "integer": "a whole number",
+    "string": "a text",
+    "array": "a list",
+    "object": "a mapping of keys to values",
+}
+
+
+class UnreadableError(SbsError):
+    """A file that is not YAML."""
+
+
+def read_yaml(path: Path) -> Any:
+    """Content of a YAML file.
+
+    Raises
+    ------
+    UnreadableError
+        It cannot be read, in one line.
+    """
+    from ruamel.yaml import YAML  # here, because it is slow to import and needed once
+
+    try:
+        return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    except Exception as error:  # the parser lets out all kinds: for "!!int x", a 31st of June, deep nesting
+        raise UnreadableError("not readable as YAML: " + " ".join(str(error).split())) from None
+
+
+def problems(data: Any, validator: Any) -> list[str]:
+    """All that is wrong with keys, types and plain ranges, each as "path = value: what is allowed".
+
+    Parameters
+    ----------
+    data : object
+        As read from YAML.
+    validator : jsonschema validator
+    """
+    errors = sorted(validator.iter_errors(data), key=lambda error: list(map(str, error.path)))
+    # only data that the schema accepts have a structure that is known, in which the search comes to an end
+    found = [_explain(error) for error in errors] or [
+        f"{path} = {value}: allowed is a finite number" for path, value in _not_finite(data, "")
+    ]
+    return list(dict.fromkeys(found))
+
+
+def _not_finite(data: Any, path: str) -> list[tuple[str, float]]:
+    if isinstance(data, dict):
+        return [item for key, value in data.items() for item in _not_finite(value, f"{path}.{key}".lstrip("."))]
+    if isinstance(data, list):
+        return [item for i, value in enumerate(data) for item in _not_finite(value, f"{path}[{i}]")]
+    return [(path, data)] if isinstance(data, float) and not math.isfinite(data) else []
+
+
+def _explain(error: Any) -> str:
+    """One schema error as "path = value: what is allowed"."""
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error.absolute_path)
+    path = path.lstrip(".")
+    rule, limit, value = error.validator, error.validator_value, error.instance
+    if rule == "additionalProperties":
+        known = error.schema["properties"]
+        unknown = [_key(key) for key in value if key not in known]
+        where = ", ".join(f"{path}.{key}".lstrip(".") for key in unknown)
+        return f"{where}: unknown key, allowed are {', '.join(known)}"
+    if rule == "dependentRequired":
+        missing = sorted({name for key, names in limit.items() if key in value for name in names if name not in value})
+        return f"{', '.join(f'{path}.{key}'.lstrip('.') for key in missing)}: missing key"
+    if rule == "required":
+        missing = [key for key in limit if key not in value]
+        return f"{', '.join(f'{path}.{key}'.lstrip('.') for key in missing)}: missing key"
+    allowed = {
+        "type": TYPE_WORDS.get(str(limit), f"of type {limit}"),
+        "enum": "one of " + ", ".join(map(str, limit)) if rule == "enum" else "",
+        "minimum": f">= {limit}",
+        "maximum": f"<= {limit}",
+        "exclusiveMinimum": f"> {limit}",
+        "minItems": f"a list of at least {limit}",
+        "minProperties": f"a mapping with at least {limit}",
+        "maxProperties": f"a mapping with at most {limit}",
+        "maxItems": f"a list of at most {limit}",
+        "minLength": "a text that is not empty",
+    }.get(rule, error.message)
+    return f"{path or 'file'} = {short(value)}: allowed is {allowed}"
+
+
+def _key(key: Any) -> str:
+    return key if isinstance(key, str) and key.isprintable() else short(key)
+
+
+def short(value: Any) -> str:
+    """Value in at most 60 characters."""
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,105 @@
+"""Node `hover_hold`: keeps place and heading; the worked example of what `linearize` is good for (docs/tutorial.md).
+
+Calls `linearize`, designs the gains and prints them; from then on every `state` is answered by `controls`. Subscribes
+`target` (where to go; at first it stays where it is), `events` for resets and `status` for pauses; publishes
+`diagnostics`.
+"""
+
+import math
+import sys
+import time
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseStamped
+from numpy.typing import NDArray
+
+from sbs_msgs.msg import FlightEvent, LinearModel
+from sbs_msgs.srv import Linearize
+from sbs_sim.errors import PilotError, SbsError
+from sbs_sim.model import state as S
+from sbs_sim.model.frames import quaternion_to_euler
+from sbs_sim.nodes.host import COMMAND_QOS, COMPLAINT_PERIOD, Parameter, Refusals, declare, run
+from sbs_sim.nodes.pilot import PilotNode
+from sbs_sim.nodes.pilot_conversions import hover_model, to_target
+from sbs_sim.pilot.hover_hold import LIMITS, HoverHold, design
+
+PARAMETERS = {
+    "largest_distance": Parameter(100.0, "Targets farther from the aircraft than this are refused [m]", 0.1, 1e5),
+    "patience": Parameter(60.0, "How long to wait for the service linearize [s]", 1.0, 3600.0),
+    "position_limit": Parameter(
+        LIMITS["forward"], "Departure of place that costs like the others at theirs [m]: less is tighter", 0.05, 10.0
+    ),
+}
+ASKING = 0.2  # s between two looks whether the service is there
+
+
+class HoverHoldNode(PilotNode):
+    """See the module."""
+
+    def __init__(self) -> None:
+        super().__init__("hover_hold")
+        parameters = declare(self, PARAMETERS)
+        self._largest_distance = parameters["largest_distance"]
+        model = hover_model(self._linearized(parameters["patience"]))
+        found = design(model, dict.fromkeys(("forward", "right", "down"), parameters["position_limit"]))
+        print("\n".join(found.describe()), flush=True)
+        self._pilot = HoverHold(found)
+        self._refusals = Refusals(self, "target")
+        self.create_subscription(PoseStamped, "target", self._on_target, COMMAND_QOS)
+        self.begin()
+
+    def _linearized(self, patience: float) -> LinearModel:
+        """Linear model of hover, from the service."""
+        client = self.create_client(Linearize, "linearize")
+        self.get_logger().info("asking linearize for the model of hover")
+        end = time.monotonic() + patience
+        while not client.wait_for_service(ASKING):
+            if time.monotonic() > end:
+                raise PilotError(f"no service linearize within {patience:g} s: is a simulator running?")
+        answer = client.call_async(Linearize.Request())
+        rclpy.spin_until_future_complete(self, answer, timeout_sec=max(ASKING, end - time.monotonic()))
+        if not answer.done():
+            raise PilotError(f"no answer of linearize within {patience:g} s")
+        self.destroy_client(client)
+        if not answer.result().success:
+            raise PilotError(f"linearize: {answer.result().message}")
+        return answer.result().model
+
+    def fly(self, now: float, body: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Answer a state with controls."""
+        if self.body is None or now < self.time:
+            self.get_logger().info("holding the place where the aircraft is")
+        return self._pilot.controls(now, body)
+
+    def _on_target(self, message: PoseStamped) -> None:
+        try:
+            place, heading = to_target(message)
+            if self.body is None:
+                raise PilotError("no state has come yet")
+            distance = float(np.linalg.norm(place - self.body[: S.ATTITUDE]))
+            if distance > self._largest_distance:
+                raise PilotError(f"distance = {distance:g} m: allowed are 0 to {self._largest_distance:g} m")
+            self._pilot.hold(place, heading)
+        except SbsError as error:
+            self._refusals.add(error)
+            return
+        north, east, down = place
+        text = f"north {north:.2f}, east {east:.2f}, height {-down:.2f} m, heading {math.degrees(heading):.1f} deg"
+        self.get_logger().info(f"target: {text}", throttle_duration_sec=COMPLAINT_PERIOD)
+
+    def on_event(self, event: FlightEvent, is_new: bool) -> None:
+        """After a reset the place is another, and what was wanted before is void."""
+        if is_new and event.kind == FlightEvent.RESET:
+            state = np.array(event.state)
+            self._pilot.restart((state[: S.ATTITUDE], quaternion_to_euler(state[S.ATTITUDE : S.VELOCITY])[0]))
+            self.get_logger().info("reset: holding the place where the aircraft is put")
+
+    def values(self) -> dict[str, object]:
+        """Refused targets."""
+        return self._refusals.values()
+
+
+def main(args: list[str] | None = None) -> None:
+    """Hold until interrupted."""
+    sys.exit(run(lambda: [HoverHoldNode()], args))

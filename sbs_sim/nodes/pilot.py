@@ -1,0 +1,93 @@
+"""What the nodes that fly have in common: every `state` is answered by `controls`.
+
+Without states there are no controls, so a pause holds everything; the simulator holds the last controls meanwhile.
+"""
+
+import time
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from numpy.typing import NDArray
+from rclpy.clock import Clock, ClockType
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+from sbs_msgs.msg import BodyState, Controls, FlightEvent, SimulationStatus
+from sbs_sim.errors import SbsError
+from sbs_sim.nodes.conversions import to_seconds
+from sbs_sim.nodes.host import COMMAND_QOS, EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Component, Refusals, diagnostic
+from sbs_sim.nodes.pilot_conversions import body_array, controls_message
+
+Array = NDArray[np.float64]
+
+STALE = 0.5  # s of wall time without a state
+LATE = 1.0  # s of simulation time that an event may come after later states
+NEWEST_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)  # a queue of states would be a delay
+
+
+class PilotNode(Component):
+    """A node that flies. Subclasses define `fly`, and `on_event` if resets matter to them; `begin` starts them.
+
+    Attributes
+    ----------
+    body : ndarray, shape (13,), or None
+        The latest state: position, attitude, velocity, rates.
+    time : float
+        Of the latest state [s of simulation time].
+    """
+
+    def begin(self) -> None:
+        """Make publishers and subscriptions, once everything else is ready."""
+        self.body: Array | None = None
+        self.time = 0.0
+        self._arrived = time.monotonic()
+        self._paused = self._stale = False
+        self._bad_states = Refusals(self, "state")
+        self._output = self.create_publisher(Controls, "controls", COMMAND_QOS)
+        self._health = self.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
+        self.create_subscription(FlightEvent, "events", self._on_event, EVENT_QOS)
+        self.create_subscription(SimulationStatus, "status", self._on_status, STATE_QOS)
+        self.create_subscription(BodyState, "state", self._on_state, NEWEST_QOS)
+        self.create_timer(HEALTH_PERIOD, self._look_after, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def fly(self, now: float, body: Array) -> Array | None:
+        """Controls [rad], shape (4,), of a state; None is not to fly. SbsError refuses the state."""
+        raise NotImplementedError
+
+    def on_event(self, event: FlightEvent, is_new: bool) -> None:
+        """Something acted on the flight: before this node has seen a state, or now (`is_new`)."""
+
+    def problems(self) -> list[str]:
+        """Problems to tell in diagnostics."""
+        return []
+
+    def values(self) -> dict[str, object]:
+        """Values to tell in diagnostics."""
+        return {}
+
+    def _on_state(self, message: BodyState) -> None:
+        now, body = to_seconds(message.header.stamp), body_array(message)
+        try:
+            controls = self.fly(now, body)
+        except SbsError as error:
+            self._bad_states.add(error)
+            return
+        if controls is not None:
+            self._output.publish(controls_message(controls, message.header.stamp))
+        self.time, self.body, self._arrived = now, body, time.monotonic()
+
+    def _on_event(self, message: FlightEvent) -> None:
+        self.on_event(message, self.body is not None and to_seconds(message.header.stamp) >= self.time - LATE)
+
+    def _on_status(self, message: SimulationStatus) -> None:
+        self._paused = message.state == SimulationStatus.PAUSED
+
+    def _look_after(self) -> None:
+        """Say once when states stop to come."""
+        stale = not self._paused and time.monotonic() - self._arrived > STALE
+        if stale and not self._stale:
+            self.get_logger().warning(f"no state for {STALE:g} s: the last controls stay")
+        self._stale = stale
+        problems = ([f"no state for {STALE:g} s"] if stale else []) + self.problems()
+        values = {"paused": self._paused, **self.values()}
+        status = diagnostic(self.get_name(), [(DiagnosticStatus.WARN, text) for text in problems], values)
+        self._health.publish(DiagnosticArray(status=[status]))

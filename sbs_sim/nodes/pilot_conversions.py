@@ -1,0 +1,90 @@
+"""Messages of the pilots: states and targets to arrays, controls to messages.
+
+Positions inside are NED, attitudes FRD to NED; targets may come in the axes of REP 103 too (ENU, FLU).
+"""
+
+import math
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseStamped
+from numpy.typing import NDArray
+
+from sbs_msgs.msg import BodyState, Controls, LinearModel
+from sbs_sim.errors import PilotError
+from sbs_sim.model import state as S
+from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
+from sbs_sim.nodes.conversions import FRAME_NED, FRAME_ODOM, controls_array, enu_flu_quaternion, point_array
+from sbs_sim.pilot.hover_hold import HoverModel
+
+Array = NDArray[np.float64]
+
+LARGEST_TILT = math.radians(10.0)  # of a target, of which only the heading can be held
+
+
+def controls_message(controls: Array, stamp: Time) -> Controls:
+    """Message of pilot controls [rad], shape (4,)."""
+    message = Controls(**dict(zip(S.CONTROL_NAMES, controls.tolist(), strict=True)))
+    message.header.stamp = stamp
+    return message
+
+
+def body_array(message: BodyState) -> Array:
+    """Position, attitude, velocity and rates, shape (13,): the first part of the simulation state."""
+    q = message.attitude
+    attitude = np.array([q.w, q.x, q.y, q.z])
+    vectors = [point_array(part) for part in (message.velocity, message.angular_velocity)]
+    return np.concatenate([point_array(message.position), attitude, *vectors])
+
+
+def hover_model(message: LinearModel) -> HoverModel:
+    """What a design takes of a linear model of hover.
+
+    Raises
+    ------
+    PilotError
+        The model is not one of hover.
+    """
+    n, m = len(message.state_names), len(message.control_names)
+    point = message.trim
+    return HoverModel.checked(
+        point.condition,
+        tuple(message.state_names),
+        np.reshape(message.a, (n, n)),
+        np.reshape(message.b, (n, m)),
+        controls_array(point.controls),
+        point.pitch,
+        point.roll,
+    )
+
+
+def to_target(message: PoseStamped) -> tuple[Array, float]:
+    """Position, NED [m], shape (3,), and heading [rad] of a pose in "ned" (of FRD) or in "odom" (ENU, of FLU).
+
+    Raises
+    ------
+    PilotError
+        Another frame, a number that is not finite, no unit quaternion, or an attitude that cannot be held.
+    """
+    frame = message.header.frame_id
+    if frame not in (FRAME_NED, FRAME_ODOM):
+        raise PilotError(f"frame_id = {frame!r}: allowed are {FRAME_NED!r}, {FRAME_ODOM!r}")
+    place, turn = message.pose.position, message.pose.orientation
+    for name, part in (("position", place), ("orientation", turn)):
+        for axis in part.get_fields_and_field_types():
+            if not math.isfinite(getattr(part, axis)):
+                raise PilotError(f"{name}.{axis} = {getattr(part, axis)}: allowed are finite numbers")
+    quaternion = (turn.w, turn.x, turn.y, turn.z)
+    norm = math.hypot(*quaternion)
+    if not 0.99 <= norm <= 1.01:
+        raise PilotError(f"orientation has a norm of {norm:g}: allowed is a unit quaternion")
+    position = point_array(place)
+    if frame == FRAME_ODOM:
+        position = np.array([place.y, place.x, -place.z])
+        quaternion = enu_flu_quaternion(quaternion)  # the way there is the way back
+    unit = np.array(quaternion) / norm
+    tilt = math.acos(min(1.0, rotation_matrix(unit)[2, 2]))
+    if tilt > LARGEST_TILT:
+        allowed = f"allowed are 0 to {math.degrees(LARGEST_TILT):g} deg, of an upright aircraft"
+        raise PilotError(f"orientation is tilted by {math.degrees(tilt):.1f} deg: {allowed}")
+    return position, quaternion_to_euler(unit)[0]

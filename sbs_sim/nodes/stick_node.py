@@ -1,0 +1,114 @@
+"""What `teleop` and `joystick` have in common: sticks and augmentation around controls taken over in flight."""
+
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sbs_msgs.msg import FlightEvent
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.linearize import linearize
+from sbs_sim.model import state as S
+from sbs_sim.model.frames import quaternion_to_euler
+from sbs_sim.nodes.host import Parameter, declare
+from sbs_sim.nodes.pilot import PilotNode
+from sbs_sim.pilot.augmentation import StickPilot, augmentation
+
+Array = NDArray[np.float64]
+
+STICK_PARAMETERS = {
+    "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
+    "augmentation": Parameter(True, "Stability augmentation is on at the start"),
+}
+SETTLING = 0.3  # s of wall time in which the events of the flight so far arrive
+
+
+class StickNode(PilotNode):
+    """A pilot with sticks, who takes over the controls where they stand.
+
+    Parameters
+    ----------
+    name : str
+    parameters : dict of str to Parameter
+    """
+
+    def __init__(self, name: str, parameters: dict[str, Parameter]) -> None:
+        super().__init__(name)
+        self.settings: dict[str, Any] = declare(self, parameters)
+        self._aircraft = Aircraft.load(self.settings["aircraft"])
+        self._found = augmentation(linearize(self._aircraft))
+        self._mixing = np.concatenate([rotor.mixing for rotor in self._aircraft.rotors])
+        self._stand: Array | None = None  # pilot controls of the latest event
+        self._first_event = 0.0
+        self._first: tuple[Array, float, float] | None = None  # trim at the take-over
+
+    def make_pilot(self, deflections: ArrayLike) -> None:
+        """Make the pilot with the departures of the controls at full stick [rad], shape (4,)."""
+        self.pilot = StickPilot(self._found, deflections)
+        self.pilot.augmented = self.settings["augmentation"]
+
+    def sticks(self) -> Array:
+        """Sticks now, shape (4,), -1 to 1."""
+        raise NotImplementedError
+
+    def fly(self, now: float, body: Array) -> Array | None:
+        """Sticks and augmentation; nothing until it is known where the controls stand."""
+        if self._first is None:
+            if self._stand is None or time.monotonic() - self._first_event < SETTLING:
+                return None
+            self._take_over(self._stand, body)
+        if now < self.time:
+            self._first, self._first_event = None, time.monotonic()  # another flight, whose start tells the controls
+            return None
+        self.pilot.sticks = self.sticks()
+        return self.pilot.controls(now, body)
+
+    def _take_over(self, controls: Array, body: Array) -> None:
+        _, pitch, roll = quaternion_to_euler(body[S.ATTITUDE : S.VELOCITY])
+        self._first = (controls, pitch, roll)
+        self.pilot.take_over(*self._first)
+        self.get_logger().info(f"flying, augmentation {self.switch}")
+
+    def on_event(self, event: FlightEvent, is_new: bool) -> None:
+        """Learn where the controls stand; after a reset they are another flight's."""
+        angles = np.array(event.swashplate)
+        if len(angles) != len(self._mixing):
+            return
+        if self._stand is None:
+            self._first_event = time.monotonic()
+        if self._first is None or event.kind in (FlightEvent.START, FlightEvent.RESET):
+            self._stand = np.linalg.lstsq(self._mixing, angles, rcond=None)[0]
+        if self._first is not None and is_new and event.kind == FlightEvent.RESET and self._stand is not None:
+            self.released()
+            self._take_over(self._stand, np.array(event.state))
+
+    def released(self) -> None:
+        """Let go of the sticks, because the flight is another."""
+
+    @property
+    def switch(self) -> str:
+        """On or off."""
+        return "on" if self.pilot.augmented else "off"
+
+    def switch_augmentation(self) -> None:
+        """Switch the augmentation."""
+        self.pilot.augmented = not self.pilot.augmented
+        self.get_logger().info(f"augmentation {self.switch}")
+
+    def take_trim(self) -> None:
+        """The controls and the attitude of now are the trim from now on."""
+        if self.body is not None and self._first is not None:
+            _, pitch, roll = quaternion_to_euler(self.body[S.ATTITUDE : S.VELOCITY])
+            self.pilot.take_over(self.pilot.controls(self.time, self.body), pitch, roll)
+            self.get_logger().info("trim taken")
+
+    def first_trim(self) -> None:
+        """Back to the trim at the take-over."""
+        if self._first is not None:
+            self.pilot.take_over(*self._first)
+            self.get_logger().info("back to the first trim")
+
+    def values(self) -> dict[str, object]:
+        """Switch of the augmentation."""
+        return {"augmentation": self.switch}

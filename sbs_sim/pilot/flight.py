@@ -1,0 +1,84 @@
+"""Flights with a pilot in the loop, as fast as they compute: the mixer and the simulation as the nodes run them."""
+
+import collections
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim.errors import PilotError
+from sbs_sim.mixer import Mixer
+from sbs_sim.model.wind import Wind
+from sbs_sim.simulation import Simulation, histories, trimmed_state
+
+Array = NDArray[np.float64]
+
+MOST_DELAY = 100  # ticks
+
+
+def fly(
+    aircraft: Aircraft,
+    start: TrimPoint | ArrayLike,
+    pilot: Callable[[float, Array], ArrayLike],
+    duration: float,
+    *,
+    wind: Wind | None = None,
+    delay: int = 0,
+    **options: Any,
+) -> Mapping[str, Array]:
+    """Fly for a while with a pilot who sees every state.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    start : TrimPoint or ndarray, shape (size,)
+        A trim point, flown from the origin heading north without a motion over ground in `wind`, or a simulation state.
+    pilot : callable
+        Takes time [s] and simulation state, shape (size,), and gives the pilot controls [rad], shape (4,); ranges and
+        rates are those of the mixer.
+    duration : float
+        [s], rounded to whole ticks.
+    wind : Wind, optional
+    delay : int
+        Ticks between a state and the controls that it gives, 0 to 100. Before them there are those of the trim point,
+        or of a state the first ones that the pilot gives.
+    **options
+        See `Simulation`.
+
+    Returns
+    -------
+    dict of str to ndarray
+        See `simulate`; "controls" are those of the pilot.
+
+    Raises
+    ------
+    PilotError
+        A delay out of range.
+    SimulationError
+        See `Simulation`, `Mixer.set_target`.
+    """
+    if not 0 <= delay <= MOST_DELAY:
+        raise PilotError(f"delay = {delay}: allowed are 0 to {MOST_DELAY} ticks")
+    mixer = Mixer(aircraft)
+    waiting: collections.deque[Array] = collections.deque()
+    if isinstance(start, TrimPoint):
+        state = trimmed_state(aircraft, start)
+        mixer.stand(start.swashplate)
+        waiting.extend([start.controls] * delay)
+    else:
+        state = np.asarray(start, dtype=float)
+    given = [np.asarray(pilot(0.0, state), dtype=float)]
+    simulation = Simulation(aircraft, state, aircraft.mix(given[0]), wind=wind, **options)
+    snapshots = []
+    for tick in range(round(duration / simulation.tick) + 1):
+        if tick > 0:
+            simulation.advance()
+            given.append(np.asarray(pilot(simulation.time, simulation.state), dtype=float))
+        waiting.append(given[-1])
+        mixer.set_target(waiting.popleft() if len(waiting) > delay else waiting[0])
+        simulation.set_swashplate(mixer.move(simulation.time))
+        snapshots.append(simulation.snapshot())
+    return histories(aircraft, snapshots, given)

@@ -1,0 +1,158 @@
+"""A joystick: what its axes and buttons mean, from config/joystick.yaml."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim import config_file
+from sbs_sim.aircraft import config_folder
+from sbs_sim.errors import PilotError
+from sbs_sim.model.state import CONTROL_NAMES
+from sbs_sim.pilot.sticks import shaped
+
+Array = NDArray[np.float64]
+
+PRESSED = 0.5  # of an axis that stands for two buttons
+ACTIONS = ("augmentation", "take_trim", "first_trim")
+
+
+@dataclass(frozen=True)
+class JoystickFile:
+    """Checked content of a joystick file.
+
+    Attributes
+    ----------
+    dead_zone, expo : float
+    deflections : tuple of 4 floats
+        Departure of each control from its trim at full stick [rad].
+    trim_step : float
+        [rad]
+    timeout : float
+        [s]
+    pad : dict
+        Axes, trims and buttons of the pad that was chosen.
+    """
+
+    dead_zone: float
+    expo: float
+    deflections: tuple[float, ...]
+    trim_step: float
+    timeout: float
+    pad: dict[str, Any]
+
+    @classmethod
+    def load(cls, path: str, pad: str) -> "JoystickFile":
+        """Read a file; the one that comes with the package if the path is empty.
+
+        Raises
+        ------
+        PilotError
+            One line that names the file and every wrong key with its value and what is allowed, or the pads there are.
+        """
+        place = Path(path) if path else config_folder() / "joystick.yaml"
+        try:
+            if not place.is_file():
+                raise PilotError("there is no such file")
+            data = config_file.read_yaml(place)
+            if found := config_file.problems(data, _validator()):
+                raise PilotError("; ".join(found))
+            if pad not in data["pads"]:
+                raise PilotError(f"pad = {pad!r}: allowed are {', '.join(data['pads'])}")
+        except (PilotError, config_file.UnreadableError) as error:
+            raise PilotError(f"{place}: {error}") from None
+        return cls(
+            float(data["dead_zone"]),
+            float(data["expo"]),
+            tuple(math.radians(data["deflection_deg"][name]) for name in CONTROL_NAMES),
+            math.radians(data["trim_step_deg"]),
+            float(data["timeout"]),
+            data["pads"][pad],
+        )
+
+
+def _validator() -> Any:
+    from jsonschema import Draft202012Validator  # here, because it is slow to import and needed once
+
+    return Draft202012Validator(json.loads((config_folder() / "joystick.schema.json").read_text(encoding="utf-8")))
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What one message of a joystick says.
+
+    Attributes
+    ----------
+    sticks : ndarray, shape (4,)
+        -1 to 1, positive as the controls.
+    trim : ndarray, shape (4,)
+        Presses of the trim buttons since the message before, -1, 0 or 1.
+    actions : tuple of str
+        Buttons of `ACTIONS` that have been pressed since then.
+    """
+
+    sticks: Array
+    trim: Array
+    actions: tuple[str, ...]
+
+
+class Joystick:
+    """Reads messages one after the other.
+
+    Parameters
+    ----------
+    file : JoystickFile
+    """
+
+    def __init__(self, file: JoystickFile) -> None:
+        self._file = file
+        self._held: set[tuple[str, float]] | None = None
+
+    def read(self, axes: Sequence[float], buttons: Sequence[int]) -> Reading:
+        """Reading of a message; what is held down in the first one counts as held before.
+
+        Raises
+        ------
+        PilotError
+            It has not the axes and buttons of the pad, or a value that is not finite; nothing has changed then.
+        """
+        sticks = np.zeros(len(CONTROL_NAMES))
+        for i, name in enumerate(CONTROL_NAMES):
+            entry = self._file.pad["axes"][name]
+            value = entry["sign"] * _at(axes, entry["axis"], "axes")
+            sticks[i] = shaped(value, self._file.dead_zone, self._file.expo)
+        held = self._now_held(axes, buttons)
+        new = set() if self._held is None else held - self._held
+        self._held = held
+        trim = np.array([sum(sense for what, sense in new if what == name) for name in CONTROL_NAMES])
+        return Reading(sticks, trim, tuple(action for action in ACTIONS if (action, 0.0) in new))
+
+    def _now_held(self, axes: Sequence[float], buttons: Sequence[int]) -> set[tuple[str, float]]:
+        """Buttons that are down: names of actions with 0, of controls to be trimmed with the sense."""
+        held = {
+            (name, 0.0) for name, place in self._file.pad.get("buttons", {}).items() if _at(buttons, place, "buttons")
+        }
+        for name, entry in self._file.pad.get("trims", {}).items():
+            if "axis" in entry:
+                value = entry["sign"] * _at(axes, entry["axis"], "axes")
+                if abs(value) > PRESSED:
+                    held.add((name, math.copysign(1.0, value)))
+                continue
+            for key, sense in (("plus", 1.0), ("minus", -1.0)):
+                if _at(buttons, entry[key], "buttons"):
+                    held.add((name, sense))
+        return held
+
+
+def _at(values: Sequence[float], place: int, what: str) -> float:
+    if place >= len(values):
+        raise PilotError(f"{what} has {len(values)} values: the pad needs {what}[{place}]")
+    value = float(values[place])
+    if not math.isfinite(value):
+        raise PilotError(f"{what}[{place}] = {value}: allowed are finite numbers")
+    return value

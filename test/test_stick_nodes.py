@@ -1,0 +1,266 @@
+"""Keyboard and joystick as their users meet them: a real terminal, real messages, a simulator in flight."""
+
+import contextlib
+import fcntl
+import math
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+import termios
+import threading
+import time
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy")
+
+from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, environment, world  # noqa: E402
+from sensor_msgs.msg import Joy  # noqa: E402
+
+from sbs_msgs.msg import BodyState, Controls  # noqa: E402
+from sbs_msgs.srv import Reset  # noqa: E402
+from sbs_sim import Aircraft, trim  # noqa: E402
+from sbs_sim.model.state import CONTROL_NAMES  # noqa: E402
+from sbs_sim.pilot.sticks import shaped  # noqa: E402
+
+TRIM = trim(Aircraft.load("sbs")).controls
+
+
+def controls_of(message):
+    return np.array([getattr(message, name) for name in CONTROL_NAMES])
+
+
+def near_trim(message):
+    """Within what augmentation does in a calm hover."""
+    return np.abs(controls_of(message) - TRIM).max() < math.radians(0.2)
+
+
+class Terminal:
+    """An executable in a terminal of its own."""
+
+    def __init__(self, domain, folder, *arguments):
+        self._user, self._side = pty.openpty()
+        self.before = termios.tcgetattr(self._side)
+        side = self._side
+        self._popen = subprocess.Popen(
+            [sys.executable, str(EXECUTABLES / "teleop"), "--ros-args", *arguments],
+            stdin=side,
+            stdout=side,
+            stderr=side,
+            env=environment(domain, folder),
+            start_new_session=True,
+            preexec_fn=lambda: fcntl.ioctl(side, termios.TIOCSCTTY, 0),  # so that Ctrl-C comes from it
+        )
+        self.output = ""
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self):
+        with contextlib.suppress(OSError):
+            while True:
+                if select.select([self._user], [], [], 0.1)[0]:
+                    self.output += os.read(self._user, 4096).decode()
+
+    def type(self, keys):
+        """Type keys."""
+        os.write(self._user, keys.encode())
+
+    def signal(self, number):
+        """Send a signal."""
+        self._popen.send_signal(number)
+
+    def wait(self):
+        """Exit code, once it has ended."""
+        return self._popen.wait(PATIENCE)
+
+    def expect(self, text):
+        """Wait until something has been printed."""
+        end = time.monotonic() + PATIENCE
+        while text not in self.output:
+            assert time.monotonic() < end, self.output
+            assert self._popen.poll() is None, self.output
+            time.sleep(0.05)
+
+    @property
+    def modes(self):
+        """Modes of the terminal."""
+        return termios.tcgetattr(self._side)
+
+    @property
+    def hands_over_keys(self):
+        """True if keys come at once and are not shown."""
+        return not self.modes[3] & (termios.ICANON | termios.ECHO)
+
+    def close(self):
+        """End it whatever it does."""
+        if self._popen.poll() is None:
+            self._popen.kill()
+            self._popen.wait(PATIENCE)
+
+
+@pytest.fixture
+def terminal(tmp_path):
+    """Function that starts teleop in a terminal."""
+    made = []
+
+    def start(*arguments, domain=None):
+        made.append(Terminal(domain or next(DOMAINS), tmp_path, *arguments))
+        return made[-1]
+
+    yield start
+    for item in made:
+        item.close()
+
+
+@pytest.fixture
+def flight(tmp_path):
+    """A simulator and a client."""
+    with world(next(DOMAINS), tmp_path) as made:
+        made.client.watch("state", BodyState)
+        made.client.watch("controls", Controls)
+        made.simulator = made.start("simulator", record="off")
+        made.client.next("state")
+        yield made
+
+
+def test_keys_fly_and_ctrl_c_gives_the_terminal_back(flight, terminal):
+    client = flight.client
+    teleop = terminal("-p", "expo:=0.5", domain=flight.domain)
+    teleop.expect("flying, augmentation on")
+    assert teleop.hands_over_keys
+    client.next("controls", near_trim)
+
+    teleop.type("www")  # the collective stays
+    raised = TRIM[0] + math.radians(3.0) * shaped(0.3, 0.0, 0.5)
+    client.next("controls", lambda message: abs(message.collective - raised) < 1e-9)
+    client.next("state", lambda state: state.velocity.z < -0.05)
+
+    teleop.type("\x1b[A\x1b[A\x1b[A")  # a push, which goes back by itself, and with augmentation the nose too
+    client.next("controls", lambda message: message.longitudinal_cyclic - TRIM[2] > math.radians(0.05))
+    client.next("state", lambda state: state.attitude.y < -0.002)
+
+    teleop.type("g")
+    teleop.expect("augmentation off")
+    teleop.type(" ")
+    client.next("controls", lambda message: np.abs(controls_of(message) - TRIM).max() < 1e-4)
+    teleop.type("g")
+
+    assert client.call(Reset, "reset", airspeed=5.0).success
+    cruise = trim(Aircraft.load("sbs"), airspeed=5.0).controls
+    client.next("controls", lambda message: abs(message.longitudinal_cyclic - cruise[2]) < math.radians(0.05))
+    client.next("state", lambda state: state.velocity.x > 4.0)
+    assert re.search(r"controls +\S+ +\S+ +\S+ +\S+ deg  augmentation on", teleop.output)
+
+    teleop.type("\x03")
+    assert teleop.wait() == 0
+    assert teleop.modes == teleop.before
+    assert "Traceback" not in teleop.output
+
+
+def test_q_ends_it_without_a_flight(terminal):
+    teleop = terminal()
+    teleop.expect("augmentation on, off")
+    teleop.type("wq")
+    assert teleop.wait() == 0
+    assert teleop.modes == teleop.before
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_while_it_starts_gives_the_terminal_back(terminal, number):
+    teleop = terminal()
+    end = time.monotonic() + PATIENCE
+    while not teleop.hands_over_keys:
+        assert time.monotonic() < end, teleop.output
+        time.sleep(0.01)
+    teleop.signal(number)
+    assert teleop.wait() == 0
+    assert teleop.modes == teleop.before
+
+
+def test_an_error_at_the_start_gives_the_terminal_back(terminal):
+    teleop = terminal("-p", "aircraft:=zeppelin")
+    assert teleop.wait() == 1
+    time.sleep(0.3)  # for the reader of its output
+    assert teleop.modes == teleop.before
+    assert "aircraft = 'zeppelin': allowed are a file's path or one of" in teleop.output
+    assert "Traceback" not in teleop.output
+
+
+def test_without_a_terminal_it_says_so(tmp_path):
+    result = subprocess.run(
+        [sys.executable, str(EXECUTABLES / "teleop")],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        env=environment(next(DOMAINS), tmp_path),
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert result.returncode == 1
+    assert result.stderr == (
+        "the standard input is no terminal: teleop reads keys from one; a joystick flies without\n"
+    )
+
+
+class Pad:
+    """A gamepad of game_controller_node."""
+
+    def __init__(self, client):
+        self._client = client
+        self.axes, self.buttons = [0.0] * 6, [0] * 15
+
+    def send_until(self, topic, condition):
+        """Send like the driver, 20 times a second, until a message meets a condition."""
+        return self._client.publish_until("joy", Joy(axes=self.axes, buttons=self.buttons), topic, condition)
+
+    def press(self, button, topic, condition):
+        """Press and release a button."""
+        self.buttons[button] = 1
+        found = self.send_until(topic, condition)
+        self.buttons[button] = 0
+        self.send_until(topic, lambda _: True)
+        return found
+
+
+def test_a_joystick_flies_and_when_it_is_silent_the_trim_is_held(flight):
+    client = flight.client
+    node = flight.start("joystick", augmentation="false")
+    client.next("controls", near_trim)
+    pad = Pad(client)
+    pad.send_until("controls", near_trim)
+
+    pad.axes[3] = 0.5  # right stick forward: a push
+    pushed = TRIM[2] + math.radians(2.0) * shaped(0.5, 0.03, 0.4)
+    pad.send_until("controls", lambda message: abs(message.longitudinal_cyclic - pushed) < 1e-7)
+    pad.axes[3] = 0.0
+
+    pad.press(10, "controls", lambda message: abs(message.collective - TRIM[0] - math.radians(0.05)) < 1e-9)
+    pad.press(3, "controls", lambda message: abs(message.collective - TRIM[0]) < 1e-9)  # back to the first trim
+    pad.press(0, "controls", lambda _: "augmentation on" in node.output)
+
+    pad.axes[3] = 1.0
+    pad.send_until("controls", lambda message: message.longitudinal_cyclic - TRIM[2] > math.radians(1.0))
+    client.until(lambda: "no joy for 0.5 s: sticks released, the trim is held" in node.output, "a warning")
+    assert client.call(Reset, "reset").success
+    client.next("controls", near_trim)
+
+    client.publish("joy", Joy(axes=[0.0], buttons=[0]))
+    client.until(lambda: "joy rejected: axes has 1 values: the pad needs axes[1]" in node.output, "a refusal")
+    client.publish("joy", Joy(axes=[math.nan] * 6, buttons=[0] * 15))
+    client.next("controls", near_trim)
+    assert node.interrupt() == 0
+    assert "Traceback" not in node.output
+
+
+def test_a_wrong_joystick_file_is_one_line(tmp_path):
+    path = tmp_path / "pad.yaml"
+    path.write_text("expo: 2\n")
+    with world(next(DOMAINS), tmp_path) as made:
+        node = made.start("joystick", config=str(path))
+        assert node.wait() == 1
+        assert node.output.startswith(f"{path}: dead_zone, deflection_deg, trim_step_deg, timeout, pads: missing key")
+        assert node.output.count("\n") == 1

@@ -64,9 +64,7 @@ def print_table(rows: list[Row]) -> None:
         print(f"{name:<{width}}  {value:>10.4g} {unit:<6} {note}")
 
 
-def timed(
-    work: Callable[[], Any], repeats: int, clock: Callable[[], float] = time.perf_counter
-) -> tuple[float, str]:
+def timed(work: Callable[[], Any], repeats: int, clock: Callable[[], float] = time.perf_counter) -> tuple[float, str]:
     """Median time of a call [s] by a clock, and the spread of the middle half in per cent."""
     work()
     times = []
@@ -95,7 +93,9 @@ def start_rows(cold: bool) -> list[Row]:
         with tempfile.TemporaryDirectory() as folder:
             start = time.perf_counter()
             subprocess.run([sys.executable, "-c", first], check=True, env={**os.environ, "NUMBA_CACHE_DIR": folder})
-            rows.append(("process: import, load, trim, cold", time.perf_counter() - start, "s", "compiles what trim needs"))
+            rows.append(
+                ("process: import, load, trim, cold", time.perf_counter() - start, "s", "compiles what trim needs")
+            )
     return rows
 
 

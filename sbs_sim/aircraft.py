@@ -26,6 +26,7 @@ from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES, StateLayout
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
+NOT_PHYSICS = ("name", "airfoil", "collective_range", "cyclic_range", "swashplate_rate")  # of a rotor, for the model
 
 # what a schema calls its types, in words
 
@@ -289,11 +290,20 @@ class Aircraft:
 
     @cached_property
     def parameter_hash(self) -> str:
-        """SHA-256 over everything that the model takes from the aircraft file: equal for equal physics."""
+        """SHA-256 over everything that the model takes from the aircraft file: equal for equal physics.
+
+        It is taken of the values in SI units, not of how the compiled model holds them, so that other versions of this
+        package know an aircraft again.
+        """
         digest = hashlib.sha256()
-        arrays = [*self.params(), *(rotor.mixing for rotor in self.rotors)]
-        for values in arrays:
-            digest.update(f"{values.shape}{values.dtype.str}".encode() + values.tobytes())
+        for part in (self.environment, self.body, self.options, *self.rotors):
+            for name, value in vars(part).items():
+                if name not in NOT_PHYSICS:
+                    _digest(digest, name, value)
+        for rotor in self.rotors:
+            table = self.airfoils[rotor.airfoil]
+            for name in ("reynolds", "alpha", "cl", "cd"):
+                _digest(digest, name, getattr(table, name))
         return digest.hexdigest()
 
     def files(self) -> tuple[dict[str, Any], dict[str, bytes]]:
@@ -538,6 +548,15 @@ def _covers_circle(path: Path) -> bool:
         return float(rows[1].split(",")[1]) == -180.0  # the first row is the header
     except (OSError, ValueError, IndexError):  # what is wrong is told where the table is read
         return False
+
+
+def _digest(digest: Any, name: str, value: Any) -> None:
+    """Add a named number, text or array to a digest; whole numbers count as floats."""
+    if isinstance(value, str):
+        digest.update(f"{name}={value};".encode())
+        return
+    values = np.ascontiguousarray(value, dtype=np.float64) + 0.0  # there is one zero
+    digest.update(f"{name}{values.shape}".encode() + values.tobytes())
 
 
 def _airfoil_grids(aircraft: Aircraft, first_rows: dict[str, int]) -> tuple[P.IntArray, Array]:

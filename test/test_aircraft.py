@@ -1013,3 +1013,10 @@ def test_rotors_with_unequal_numbers_of_blades_hover(blades):
     assert point.thrust == pytest.approx([101.1, 101.1], rel=0.01)  # half the weight each
     assert point.beyond_limits == ()
     assert steady_second(aircraft, point) < 1e-3
+
+
+def test_the_hash_is_of_the_physics_alone(sbs):
+    """Data of an airfoil count; what limits the pilot does not."""
+    assert Aircraft.from_dict(copy.deepcopy(sbs.data)).parameter_hash == sbs.parameter_hash
+    assert sbs.with_value("rotors.airfoil", "linear_573").parameter_hash != sbs.parameter_hash
+    assert sbs.with_value("rotors.MR1.collective_range_deg", [0.0, 15.0]).parameter_hash == sbs.parameter_hash

@@ -12,8 +12,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = (
-    "simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep batch reproduce gusts"
-    " plot"
+    "simulator control_mixer analysis hover_hold teleop joystick replay cockpit"
+    " trim linearize sweep batch reproduce gusts plot"
 )
 
 # What the script itself calls; everything else is taken away from it.

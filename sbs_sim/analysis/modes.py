@@ -185,10 +185,10 @@ def _separate(
     kinds = sorted({(part.family, part.harmonic, part.rotor) for part in parts})
     weights = np.array([1.0 + kinds.index((part.family, part.harmonic, part.rotor)) for part in parts])
     right, left = right.astype(complex), left.astype(complex)
-    size = float(np.abs(poles).max())
-    left_over = list(range(len(poles)))
+    alike = np.abs(poles[:, None] - poles) <= ALIKE * float(np.abs(poles).max())
+    left_over = [i for i in range(len(poles)) if alike[i].sum() > 1]
     while left_over:
-        cluster = [i for i in left_over if abs(poles[i] - poles[left_over[0]]) <= ALIKE * size]
+        cluster = [i for i in left_over if alike[left_over[0], i]]
         left_over = [i for i in left_over if i not in cluster]
         if len(cluster) > 1:
             inner = left[cluster] @ (weights[:, None] * right[:, cluster])
@@ -212,14 +212,15 @@ def _groups(parts: Sequence[Part], state_names: Sequence[str]) -> dict[str, list
 def _assign(found: Sequence[Mode], groups: dict[str, list[int]]) -> list[str]:
     """Group of each mode: as many poles to a group as it has states, with the largest total participation."""
     slots = [(name, 1.0) for name, states in groups.items() for _ in states]
-    shares = {name: [mode.participation[states].sum() for mode in found] for name, states in groups.items()}
+    participation = np.array([mode.participation for mode in found])
+    shares = {name: participation[:, states].sum(axis=1).tolist() for name, states in groups.items()}
     return [names[0] for names in _match(found, [name for name, _ in slots], shares)]
 
 
 def _match(found: Sequence[Mode], slots: Sequence[str], shares: dict[str, list[float]]) -> list[list[str]]:
     """Slots of each mode, two of a pair, that maximise the sum of the shares; the larger share first."""
     owners = [i for i, mode in enumerate(found) for _ in range(1 + mode.is_oscillatory)]
-    gain = np.array([[shares[slot][i] for slot in slots] for i in owners]).reshape(len(owners), len(slots))
+    gain = np.array([shares[slot] for slot in slots]).T[owners].reshape(len(owners), len(slots))
     result: list[list[str]] = [[] for _ in found]
     for row, column in zip(*linear_sum_assignment(gain, maximize=True), strict=True):
         result[owners[row]].append(slots[column])

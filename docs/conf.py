@@ -20,7 +20,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphin
 html_theme = "furo"
 html_title = "sbs_sim"
 html_static_path = ["static"]
-html_css_files = ["equations.css"]
+html_css_files = ["site.css"]
 html_copy_source = False
 
 myst_enable_extensions = ["dollarmath"]

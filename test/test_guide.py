@@ -82,6 +82,13 @@ def test_a_broken_link_would_be_found(tmp_path):
     assert list(broken(page, page.read_text())) == ["#three", "none.md", "x/y.py#z"]
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_the_site_has_what_is_linked(name):
+    for target in re.findall(r"\]\((?!https?:)([\w./]+)", BLOCK.sub("", text_of(name))):
+        place = ((ROOT / name).parent / target).resolve().relative_to(ROOT)
+        assert any(place.is_relative_to(part) for part in make_docs.COPIED), target
+
+
 def test_every_page_is_linked_from_the_first_one():
     linked = set(re.findall(r"\]\(([\w./]+\.md)", text_of("docs/index.md")))
     pages = {page.relative_to(ROOT / "docs").as_posix() for page in PAGES if page.is_relative_to(ROOT / "docs")}
@@ -229,7 +236,7 @@ def test_what_the_site_adds_to_the_pages(tmp_path):
     assert "../../sbs_sim" not in api
     assert len(made) > 40
     assert all(f"\napi/{name}.rst\n" in api and importlib.util.find_spec(name) for name in made)
-    listed = re.findall(r"^[\w./]+\.md$", index, re.MULTILINE)
+    listed = re.findall(r"^\w[\w :,\"-]* <([\w./]+\.md)>$", index, re.MULTILINE)
     assert len(listed) == len(set(listed))
     assert {
         "../README.md",

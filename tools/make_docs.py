@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 GENERATOR = ROOT / ".cache" / "docs"  # not in the environment: it needs another docutils than that
 INSTALL = "./run python -m pip install --no-deps --target .cache/docs -r docs/requirements.txt"
 FONT = "ziamath/fonts/STIXTwoMath-Regular.ttf"
-COPIED = ("README.md", "CHANGELOG.md", "LICENSE", "docs", "config", "sbs_sim")
+COPIED = ("README.md", "CHANGELOG.md", "LICENSE", "docs", "config", "sbs_sim", "test/data")
 FIRST_PAGE = '<!DOCTYPE html><meta http-equiv="refresh" content="0; url=docs/index.html"><title>sbs_sim</title>\n'
 MODULE_LINK = re.compile(r"\[`(sbs_sim[\w.]*)`\]\(\.\./\.\./sbs_sim/[\w/]+\.py\)")
 
@@ -54,7 +54,9 @@ def add_contents(source: Path) -> None:
     text = index.read_text(encoding="utf-8")
     parts = re.split(r"^## (.+)$", text, flags=re.MULTILINE)
     sections = zip(["", *parts[1::2]], parts[::2], strict=True)
-    text += "".join(contents(title, re.findall(r"\]\(([\w./]+\.md)\)", part)) for title, part in sections)
+    for title, part in sections:
+        links = re.findall(r"\[([^\]]+)\]\(([\w./]+\.md)\)", part)
+        text += contents(title, [f"{name} <{page}>" for name, page in links])
     index.write_text(text, encoding="utf-8")
 
 

@@ -221,8 +221,8 @@ def topic_rows() -> list[list[str]]:
         qos = next(item.qos for item in sorted(found, key=lambda item: item.role) if item.qos is not None)
         package, _, plain = found[0].type.partition("/")
         kind = f"[`{found[0].type}`](#{plain.lower()})" if package == "sbs_msgs" else f"`{found[0].type}`"
-        ends = [nodes_of(found, role) for role in ("publisher", "subscription")]
-        rows.append([f"`{name}`", kind, *ends, quality(qos), meaning(name, found[0].type, "msg")])
+        ends = " to ".join(nodes_of(found, role) or "anybody" for role in ("publisher", "subscription"))
+        rows.append([f"`{name}`", kind, meaning(name, found[0].type, "msg"), ends, quality(qos)])
     return rows
 
 
@@ -235,7 +235,7 @@ everybody may publish `controls` or, without the mixer, `swashplate`.
 
 def topics() -> str:
     """docs/reference/topics.md."""
-    parts = [TOPICS, table(["topic", "type", "from", "to", "quality of service", "holds"], topic_rows()), "## Messages"]
+    parts = [TOPICS, table(["topic", "type", "holds", "from, to", "quality of service"], topic_rows()), "## Messages"]
     for path in sorted((INTERFACES / "msg").glob("*.msg")):
         (part,) = parts_of(path)
         parts += [f"### {path.stem}", prose(part.comment), entries(part, "")]

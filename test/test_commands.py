@@ -293,7 +293,7 @@ def test_help_names_units_and_needs_nothing_slow(name):
     text = output(name, "--help")
     assert text.startswith(f"usage: {name} ")
     assert all(unit in text for unit in ("[m/s]", "[deg]", "[deg/s]", "PATH=VALUE"))
-    code = f"import sys, sbs_sim.commands.{name} as c; c._parser().format_help(); print('numpy' in sys.modules)"
+    code = f"import sys, sbs_sim.commands.{name} as c; c.make_parser().format_help(); print('numpy' in sys.modules)"
     assert subprocess.check_output([sys.executable, "-c", code], text=True) == "False\n"
 
 

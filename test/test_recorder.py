@@ -46,6 +46,7 @@ from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
 
 DEGREE = math.radians(1.0)
 STATE_TOPICS = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "odom": Odometry, "/clock": Clock}
+HOVER_STEP = Path(__file__).resolve().parent.parent / "bags" / "hover_step.mcap"
 
 
 @pytest.fixture(scope="module")
@@ -501,6 +502,24 @@ def test_a_flight_that_did_not_fit_on_the_disk_is_an_error(tmp_path, recorded):
     assert found.stderr == f"cannot write {output}: File too large\n"
     assert found.stdout == ""
 
+def test_a_topic_that_somebody_else_publishes_is_not_played(tmp_path):
+    """Two clocks, or the commands of a log for the aircraft of a simulator: no message of it is to come."""
+    with world(next(DOMAINS), tmp_path) as made:
+        made.client.node.create_publisher(Clock, "/clock", 10)
+        states = made.client.watch("state", BodyState)
+        refused = replay(HOVER_STEP, "--delay", 30, domain=made.domain)  # discovered before that
+        made.client.spin(0.3)
+        assert refused.returncode == 1
+        assert refused.stderr.startswith("somebody else publishes /clock already: ")
+        assert len(refused.stderr.splitlines()) == 1
+        assert "--topics" in refused.stderr
+        assert "ROS_DOMAIN_ID" in refused.stderr
+        assert not states
+        others = replay(HOVER_STEP, "--end", 0.1, "--delay", 30, "--topics", "state", domain=made.domain)
+        assert others.returncode == 0, others.stderr
+        made.client.until(lambda: states, "a replayed state")
+
+
 
 def test_what_a_cut_log_is_compared_with_is_said(tmp_path, recorded):
     cut = tmp_path / "cut.mcap"
@@ -634,12 +653,11 @@ def test_nothing_to_play_is_an_error(recorded):
 
 def test_the_log_that_comes_along_is_flown_again():
     """Recorded elsewhere, perhaps: the same bits where the versions are the same, else within the tolerance."""
-    path = Path(__file__).resolve().parent.parent / "bags" / "hover_step.mcap"
-    assert path.stat().st_size < 1_000_000
-    log = read(path)
+    assert HOVER_STEP.stat().st_size < 1_000_000
+    log = read(HOVER_STEP)
     assert log.complete
     for name in ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic"):
         assert np.ptp(log["controls"][name]) == pytest.approx(math.radians(0.5), rel=1e-6)
-    found = replay("--verify", path)
+    found = replay("--verify", HOVER_STEP)
     assert found.returncode == 0, found.stdout
     assert "identical" in found.stdout or "within" in found.stdout

@@ -7,6 +7,7 @@ reads logs of other writers too, as long as their message types are installed.
 import argparse
 import importlib
 import itertools
+import math
 import signal
 import sys
 import threading
@@ -31,7 +32,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
 from sbs_sim.nodes.executables import INTERRUPTED
-from sbs_sim.nodes.host import EVENT_QOS, STATE_QOS, Component, run
+from sbs_sim.nodes.host import DISCOVERY, EVENT_QOS, STATE_QOS, Component, run
 from sbs_sim.nodes.recorder import Recorder, definition_file
 from sbs_sim.recording import Log, message_definition, read, recover
 from sbs_sim.recording.definitions import parse
@@ -42,6 +43,10 @@ from sbs_sim.simulation import Simulation, refly
 LARGEST_RATE = 1000.0
 LONGEST_DELAY = 3600.0  # s
 EMPTY = "structure_needs_at_least_one_member"
+# of which every node may be a publisher
+SHARED = frozenset(("/rosout", "/parameter_events", "/diagnostics", "/tf", "/tf_static"))
+LOOK_PERIOD = 0.05  # s between looks at who else is there
+LOOKOUT = 10.0  # s of playing in which somebody may still be discovered: most are at once, but not on a busy machine
 SHORTEST_PASS = 0.05  # s of wall time: a loop over an instant is no flood
 RECOVERED = ".recovered.mcap"
 
@@ -61,7 +66,7 @@ class Replay(Component):
     topics : sequence of str
         Those to publish; all if empty.
     delay : float
-        Longest time to wait until somebody listens to every topic [s].
+        Longest time to wait until somebody listens to every topic [s]; that in which others are found is waited anyway.
     ended : threading.Event
         Set at the end of the log.
 
@@ -92,6 +97,7 @@ class Replay(Component):
         self._wake = threading.Condition()
         self._paused = self._stopping = False
         self._ended = ended
+        self._next_look, self._lookout_end = 0.0, math.inf
         self.create_service(SetBool, "pause", self._on_pause)
         self._thread = threading.Thread(target=self._play, name="replay", daemon=True)
         self._thread.start()
@@ -132,7 +138,7 @@ class Replay(Component):
 
     def _play(self) -> None:
         try:
-            self._await_listeners()
+            self._await_others()
             for _ in itertools.count() if self._loop else range(1):
                 begun = time.monotonic()
                 if not self._play_once() or self._wait_until(begun + SHORTEST_PASS) is None:
@@ -145,14 +151,28 @@ class Replay(Component):
         finally:
             self._ended.set()
 
-    def _await_listeners(self) -> None:
-        """Give those who listen already the time to be discovered, so that they get the beginning."""
-        end = time.monotonic() + self._delay
+    def _await_others(self) -> None:
+        """Give others the time to be discovered: who publishes the same, and who is to get the beginning."""
+        begin = time.monotonic()
+        patience = DISCOVERY
         with self._wake:
-            while not self._stopping and (left := end - time.monotonic()) > 0:
-                self._wake.wait(min(left, 0.05))
-                if all(output.get_subscription_count() for output in self._outputs.values()):
-                    return
+            while not self._stopping and (left := begin + patience - time.monotonic()) > 0:
+                self._wake.wait(min(left, LOOK_PERIOD))
+                self._look_out()
+                heard = all(output.get_subscription_count() for output in self._outputs.values())
+                patience = DISCOVERY if heard else max(DISCOVERY, self._delay)
+        self._lookout_end = time.monotonic() + LOOKOUT
+
+    def _look_out(self) -> None:
+        """Raise SbsError if somebody else publishes a topic too: recorded commands would fly a simulator."""
+        now = time.monotonic()
+        if not self._next_look <= now < self._lookout_end:
+            return
+        self._next_look = now + LOOK_PERIOD
+        for name in sorted({output.topic_name for output in self._outputs.values()} - SHARED):
+            if self.count_publishers(name) > 1:
+                remedy = "--topics chooses others, another ROS_DOMAIN_ID keeps apart"
+                raise SbsError(f"somebody else publishes {name} already: {remedy}")
 
     def _play_once(self) -> bool:
         """Publish the log from start to end; false if that was broken off."""
@@ -167,6 +187,7 @@ class Replay(Component):
             if held is None:
                 return False
             anchor += held
+            self._look_out()
             self._outputs[channel].publish(data)
         if anchor is None:
             raise RecordingError(f"{self._playback.path}: there is nothing to play in this part or on these topics")
@@ -383,7 +404,10 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--loop", action="store_true", help="begin again at the end")
     parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, all if not given; after FILE")
     parser.add_argument(
-        "--delay", type=float, default=1.0, help="longest wait before the first message until every topic is heard [s]"
+        "--delay",
+        type=float,
+        default=DISCOVERY,
+        help=f"longest wait before the first message until every topic is heard [s]; {DISCOVERY:g} are waited anyway",
     )
     one = parser.add_mutually_exclusive_group()
     one.add_argument("--verify", action="store_true", help="fly the log again and compare every state bit for bit")

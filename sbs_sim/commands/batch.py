@@ -25,10 +25,11 @@ LISTED = 10  # flights that ended early, with their reasons
 
 def main() -> int:
     """Executable `batch`."""
-    return execute(_parser(), _work)
+    return execute(make_parser(), _work)
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """Command line of `batch`."""
     parser = argparse.ArgumentParser(
         prog="batch",
         description="Fly many flights through turbulence, hands off: each is trimmed, keeps the controls of its trim,"

@@ -21,10 +21,11 @@ LONGEST = 3600.0  # s
 
 def main() -> int:
     """Executable `gusts`."""
-    return execute(_parser(), _work)
+    return execute(make_parser(), _work)
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """Command line of `gusts`."""
     parser = argparse.ArgumentParser(
         prog="gusts",
         description="Design the hover hold, print its gains, poles and margins, and fly it in turbulence and in"

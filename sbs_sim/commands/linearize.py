@@ -33,10 +33,11 @@ COLUMNS = 10  # of a matrix side by side
 
 def main() -> int:
     """Executable `linearize`."""
-    return execute(_parser(), _work)
+    return execute(make_parser(), _work)
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """Command line of `linearize`."""
     parser = argparse.ArgumentParser(prog="linearize", description="Linearize an aircraft and print its modes.")
     add_flight_arguments(parser)
     group = parser.add_argument_group("linear model")

@@ -9,6 +9,11 @@ from sbs_sim.commands.common import execute
 
 def main() -> None:
     """Draw what the command line names."""
+    sys.exit(execute(make_parser(), _work))
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Command line of `plot`."""
     parser = argparse.ArgumentParser(prog="plot", description="Draw a recorded flight over time.")
     parser.add_argument("file", type=Path, help="MCAP log")
     parser.add_argument(
@@ -18,7 +23,7 @@ def main() -> None:
         metavar="FILE",
         help=".png, .svg or .html; may be given several times (default: the log's name with .png)",
     )
-    sys.exit(execute(parser, _work))
+    return parser
 
 
 def _work(arguments: argparse.Namespace) -> None:

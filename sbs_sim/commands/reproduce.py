@@ -18,10 +18,11 @@ SHOWN_SPEEDS = 5  # every so many of the forward speeds are printed
 
 def main() -> int:
     """Executable `reproduce`."""
-    return execute(_parser(), _work)
+    return execute(make_parser(), _work)
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """Command line of `reproduce`."""
     parser = argparse.ArgumentParser(
         prog="reproduce",
         description="Compute the paper's Tables 1 to 5, its inflow poles and its trims, and print them beside the"

@@ -33,10 +33,11 @@ MOST_POINTS = 100_000
 
 def main() -> int:
     """Executable `sweep`."""
-    return execute(_parser(), _work)
+    return execute(make_parser(), _work)
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """Command line of `sweep`."""
     parser = argparse.ArgumentParser(
         prog="sweep",
         usage="sweep PARAMETER (START STOP COUNT | --values X [X ...]) [options]",

@@ -21,10 +21,11 @@ if TYPE_CHECKING:
 
 def main() -> int:
     """Executable `trim`."""
-    return execute(_parser(), _work)
+    return execute(make_parser(), _work)
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """Command line of `trim`."""
     parser = argparse.ArgumentParser(prog="trim", description="Trim an aircraft and print the steady flight.")
     add_flight_arguments(parser)
     parser.add_argument(

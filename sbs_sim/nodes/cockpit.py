@@ -135,7 +135,8 @@ def check_address(host: str, port: int) -> None:
         raise SbsError(f"cannot serve on {host}:{port}: {error.strerror or error}; see --host and --port") from None
 
 
-def _parse(arguments: list[str]) -> argparse.Namespace:
+def make_parser() -> argparse.ArgumentParser:
+    """Command line of `cockpit`."""
     parser = argparse.ArgumentParser(
         prog="cockpit",
         description="Fly in the browser: starts a simulator and serves a page that shows and steers it.",
@@ -144,6 +145,11 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--host", default=HOST, help=f"address to serve on (default: {HOST}, this machine only)")
     parser.add_argument("--port", type=int, default=PORT, help=f"1 to 65535 (default: {PORT})")
     parser.add_argument("--attach", action="store_true", help="join a simulator that flies already, start none")
+    return parser
+
+
+def _parse(arguments: list[str]) -> argparse.Namespace:
+    parser = make_parser()
     options = parser.parse_args(arguments)
     if not 1 <= options.port <= 65535:
         parser.error(f"--port {options.port}: allowed are 1 to 65535")

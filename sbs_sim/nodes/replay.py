@@ -403,7 +403,8 @@ def main(args: list[str] | None = None) -> None:
         sys.exit(1)
 
 
-def _parse(arguments: list[str]) -> argparse.Namespace:
+def make_parser() -> argparse.ArgumentParser:
+    """Command line of `replay`."""
     parser = argparse.ArgumentParser(prog="replay", description="Publish, check, repair or fly again a log.")
     parser.add_argument("file", type=Path, help="MCAP log")
     parser.add_argument("--rate", type=float, default=1.0, help="recorded time over wall time, 0.001 to 1000")
@@ -430,6 +431,11 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
         default="",
         help="log to write, a file or a folder (default: FILE.recovered.mcap, or one named after the time)",
     )
+    return parser
+
+
+def _parse(arguments: list[str]) -> argparse.Namespace:
+    parser = make_parser()
     options = parser.parse_args(arguments)
     _check(parser, options)
     return options

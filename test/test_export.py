@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import subprocess
 import sys
 
 import numpy as np
@@ -134,6 +135,37 @@ def test_a_folder_that_may_not_be_written_to(model, tmp_path):
 def test_a_full_disk_is_told():
     with pytest.raises(ExportError, match="/dev/full: cannot be written: No space left on device"):
         write("/dev/full", "text")
+
+
+@pytest.mark.parametrize("before", [None, "old"])
+def test_a_file_is_written_whole_or_not_at_all(tmp_path, before):
+    """On a disk that takes a part of it only."""
+    path = tmp_path / "a.json"
+    if before is not None:
+        path.write_text(before)
+    code = f"""
+import resource
+from sbs_sim.analysis.export import write
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+write({str(path)!r}, "x" * 2000)
+"""
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert found.stderr.splitlines()[-1].endswith(f"ExportError: {path}: cannot be written: File too large")
+    assert {item.name: item.read_text() for item in tmp_path.iterdir()} == (
+        {} if before is None else {"a.json": before}
+    )
+
+
+def test_a_replaced_file_keeps_its_place_and_its_mode(tmp_path):
+    """Whoever linked to it or shared it with a group goes on reading it."""
+    path, link = tmp_path / "a.json", tmp_path / "link.json"
+    path.write_text("old")
+    path.chmod(0o640)
+    link.symlink_to(path)
+    write(link, "new")
+    assert link.is_symlink()
+    assert path.read_text() == "new"
+    assert path.stat().st_mode & 0o777 == 0o640
 
 
 # -- python-control --------------------------------------------------------------------------------------------------

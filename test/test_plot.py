@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sbs_sim.errors import RecordingError
+from sbs_sim.errors import ExportError
 from sbs_sim.recording import read
 from sbs_sim.recording.plot import flight_figure, plot
 
@@ -51,8 +51,14 @@ def test_files(log, tmp_path, suffix):
         assert "parameter_hash" in text
 
 
+def test_the_suffix_may_be_in_capitals(log, tmp_path):
+    assert plot(log, tmp_path / "a.PNG").read_bytes().startswith(b"\x89PNG")
+    assert "<html" in plot(log, tmp_path / "a.Html").read_text()
+
+
 def test_what_cannot_be_drawn_is_named(log, tmp_path):
-    with pytest.raises(RecordingError, match=r"allowed are \.png, \.svg, \.html"):
+    with pytest.raises(ExportError, match=r"allowed are names that end in \.png, \.svg, \.html"):
         plot(log, tmp_path / "a.pdf")
-    with pytest.raises(RecordingError, match="cannot write"):
+    with pytest.raises(ExportError, match="cannot be written: there is no folder"):
         plot(log, tmp_path / "none" / "a.png")
+    assert list(tmp_path.iterdir()) == []

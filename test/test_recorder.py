@@ -41,10 +41,12 @@ from sbs_msgs.msg import (  # noqa: E402
 )
 from sbs_msgs.srv import Reset, SetWind, Step, Trim  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
-from sbs_sim.recording import read  # noqa: E402
+from sbs_sim.recording import read, recover  # noqa: E402
+from sbs_sim.recording.flight import whole_until  # noqa: E402
 from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
 
 DEGREE = math.radians(1.0)
+HOVER_STEP = Path(__file__).resolve().parent.parent / "bags" / "hover_step.mcap"
 STATE_TOPICS = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "odom": Odometry, "/clock": Clock}
 
 
@@ -354,6 +356,90 @@ def test_the_same_commands_on_a_changed_aircraft(tmp_path, hover):
     assert not (tmp_path / "b.mcap").exists()
 
 
+def without_chunks(tmp_path, lost):
+    """Copy of the log that comes along in which some chunks are damaged."""
+    data = bytearray(HOVER_STEP.read_bytes())
+    with Source(HOVER_STEP) as source:
+        chunks = sorted(read_summary(source).chunks)
+    for place in chunks[lost]:
+        data[place + 200] ^= 1
+    path = tmp_path / f"{lost.start}.mcap"
+    path.write_bytes(data)
+    return path
+
+
+def acted(log):
+    """Times at which the events of a log began to act [s]."""
+    return log["events"]["step"] * float(log.metadata["simulation"]["step_size"])
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_where_a_log_begins_to_lack_commands(tmp_path, count):
+    whole = read(HOVER_STEP)
+    assert whole_until(whole) == math.inf
+    for first in range(1, 35, 5):
+        log = read(without_chunks(tmp_path, slice(first, first + count)))
+        lost = np.setdiff1d(acted(whole), acted(log))
+        assert lost.min() - 0.1 < whole_until(log) < lost.min() + 1e-9
+
+
+def numbered_log(path, events, states):
+    """Log of events by number and time [ns], and of states by number, one each 10 ms."""
+    from mcap.writer import Writer
+
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=500)
+        writer.start("ros2", "somebody")
+        schema = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"float64 data")
+        times = {"/events": events, "/state": {number: (number - 1) * 10_000_000 for number in states}}
+        for topic, kept in times.items():
+            channel = writer.register_channel(topic, "cdr", schema)
+            for number, now in kept.items():
+                writer.add_message(channel, now, bytes(12), now, number)
+        writer.finish()
+    return path
+
+
+AT_ONCE_AND_LATER = {1: 0, 2: 200_000_000}
+LEFT_OUT = [*range(1, 31), *range(41, 51)]  # 0.30 to 0.39 s
+LACKING = {
+    "states": (AT_ONCE_AND_LATER, LEFT_OUT, math.inf, 0.29),
+    "states before the last event": (AT_ONCE_AND_LATER, [*range(1, 11), *range(15, 51)], math.inf, math.inf),
+    "the end": (AT_ONCE_AND_LATER, range(1, 31), math.inf, math.inf),
+    "an event": ({1: 0, 2: 200_000_000, 4: 300_000_000}, range(1, 51), 0.19, 0.19),
+}
+
+
+@pytest.mark.parametrize(("events", "states", "undamaged", "damaged"), LACKING.values(), ids=LACKING)
+def test_commands_may_have_been_lost_behind_the_last_one(tmp_path, events, states, undamaged, damaged):
+    """Only in a damaged log: states alone are left out too where the disk is slow."""
+    path = numbered_log(tmp_path / "a.mcap", events, states)
+    assert whole_until(read(path)) == pytest.approx(undamaged)
+    cut = tmp_path / "cut.mcap"
+    with Source(path) as source:
+        end = read_summary(source).start
+    cut.write_bytes(path.read_bytes()[: end - 5])  # in the end of the data
+    assert not recover(cut, tmp_path / "cut.recovered.mcap").complete
+    for log in (read(cut), read(tmp_path / "cut.recovered.mcap")):
+        assert whole_until(log) == pytest.approx(damaged)
+
+
+def test_a_changed_aircraft_is_not_flown_without_commands_that_were_lost(tmp_path):
+    path, output = without_chunks(tmp_path, slice(20, 21)), tmp_path / "heavy.mcap"
+    recover(path, tmp_path / "recovered.mcap")
+    for log in (path, tmp_path / "recovered.mcap"):
+        found = replay("--with", "body.mass=23", "--output", output, log)
+        end = f"{whole_until(read(log)):.3f}"
+        assert found.returncode == 1
+        assert found.stderr == f"{log} lacks commands after {end} s: --end {end} flies those before\n"
+        assert not output.exists()
+    part = replay("--with", "body.mass=23", "--output", output, "--end", end, path)
+    assert part.returncode == 0, part.stderr
+    flown, whole = read(output), acted(read(HOVER_STEP))
+    np.testing.assert_array_equal(acted(flown), whole[whole <= float(end) + 1e-6])
+    assert flown["state"].time[-1] == pytest.approx(float(end))
+
+
 def test_a_log_of_somebody_else_is_no_flight(tmp_path):
     other = tmp_path / "other.mcap"
     from mcap.writer import Writer
@@ -416,6 +502,24 @@ def test_replay_of_a_part_and_of_some_topics(tmp_path, recorded):
     assert not received["/clock"]
 
 
+def test_a_topic_that_somebody_else_publishes_is_not_played(tmp_path):
+    """Two clocks, or the commands of a log for the aircraft of a simulator: no message of it is to come."""
+    with world(next(DOMAINS), tmp_path) as made:
+        made.client.node.create_publisher(Clock, "/clock", 10)
+        states = made.client.watch("state", BodyState)
+        refused = replay(HOVER_STEP, "--delay", 30, domain=made.domain)  # discovered before that
+        made.client.spin(0.3)
+        assert refused.returncode == 1
+        assert refused.stderr.startswith("somebody else publishes /clock already: ")
+        assert len(refused.stderr.splitlines()) == 1
+        assert "--topics" in refused.stderr
+        assert "ROS_DOMAIN_ID" in refused.stderr
+        assert not states
+        others = replay(HOVER_STEP, "--end", 0.1, "--delay", 30, "--topics", "state", domain=made.domain)
+        assert others.returncode == 0, others.stderr
+        made.client.until(lambda: states, "a replayed state")
+
+
 def test_replay_can_be_paused(tmp_path, recorded):
     def act(made):
         assert made.client.call(SetBool, "pause", data=True).success
@@ -458,6 +562,10 @@ def test_replay_again_and_again_until_it_is_ended(tmp_path, recorded):
         (["--verify", "nothing.mcap"], 1, "nothing.mcap"),
         (["--recover", "nothing.mcap"], 1, "nothing.mcap"),
         (["--verify", "--recover", "x.mcap"], 2, "not allowed with"),
+        (["x.mcap", "--verify", "--rate", "3"], 2, "--rate: not allowed with --verify"),
+        (["x.mcap", "--recover", "--loop"], 2, "--loop: not allowed with --recover"),
+        (["x.mcap", "--with", "body.mass=23", "--topics", "state"], 2, "--topics: not allowed with --with"),
+        (["x.mcap", "--with", "body.mass=23", "--end", "-1"], 2, "--end -1.0: allowed is 0 or more"),
     ],
 )
 def test_bad_arguments_are_named(arguments, code, text):
@@ -634,12 +742,11 @@ def test_nothing_to_play_is_an_error(recorded):
 
 def test_the_log_that_comes_along_is_flown_again():
     """Recorded elsewhere, perhaps: the same bits where the versions are the same, else within the tolerance."""
-    path = Path(__file__).resolve().parent.parent / "bags" / "hover_step.mcap"
-    assert path.stat().st_size < 1_000_000
-    log = read(path)
+    assert HOVER_STEP.stat().st_size < 1_000_000
+    log = read(HOVER_STEP)
     assert log.complete
     for name in ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic"):
         assert np.ptp(log["controls"][name]) == pytest.approx(math.radians(0.5), rel=1e-6)
-    found = replay("--verify", path)
+    found = replay("--verify", HOVER_STEP)
     assert found.returncode == 0, found.stdout
     assert "identical" in found.stdout or "within" in found.stdout

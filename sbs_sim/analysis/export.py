@@ -8,7 +8,10 @@ import io
 import json
 import math
 import re
+import shutil
+import uuid
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -47,19 +50,40 @@ def save(model: "LinearModel", path: str | Path) -> None:
 
 
 def write(path: str | Path, content: bytes | str) -> None:
-    """Write a file; a text in UTF-8.
+    """Write a file, whole or not at all; a text in UTF-8. An older one is replaced, devices and pipes are written to.
 
     Raises
     ------
     ExportError
-        It cannot be written: the message says why.
+        It cannot be written: the message says why, and what was there before is still there.
     """
     path = Path(path)
+    data = content.encode() if isinstance(content, str) else content
     try:
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        if path.is_file() or not path.exists():
+            _replace(path, data)
+        else:
+            path.write_bytes(data)
     except (OSError, ValueError) as error:  # the latter for names that no file can have
         reason = f"there is no folder {path.parent}" if _no_folder(path.parent) else _reason(error)
         raise ExportError(f"{path}: cannot be written: {reason}") from None
+
+
+def _replace(path: Path, data: bytes) -> None:
+    """Write beside the file, and put that into its place."""
+    with suppress(FileNotFoundError), path.open("r+b"):  # a protected file, or a name that cannot be, ends here
+        pass
+    path = path.resolve()  # a link stays one
+    beside = path.with_name(f".{uuid.uuid4().hex}")
+    try:
+        beside.write_bytes(data)
+        if path.exists():
+            shutil.copymode(path, beside)
+        beside.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            beside.unlink()
+        raise
 
 
 def check_target(path: str | Path | None, suffixes: Collection[str] = ()) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft, Rotor
-from sbs_sim.analysis.linearize import kinematics, used_states
+from sbs_sim.analysis.linearize import kinematics, settle, used_states
 from sbs_sim.analysis.trim import TrimPoint
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
@@ -75,14 +75,8 @@ def blocks(aircraft: Aircraft, point: TrimPoint, steps: Array) -> dict[str, Arra
     within = places["lambda"] - inflow.start
     found["C_lambda"] = gain[np.ix_(within, within)]
     found["A_lambda_second"] = slopes[np.ix_(places["lambda"], used)]
-    found["A_quasi_static"] = _settled(found["A"])
+    found["A_quasi_static"] = settle(found["A"], found["B"], range(S.LINEAR_BODY_SIZE))[0]
     return found
-
-
-def _settled(a: Array) -> Array:
-    """A_ss - A_sf A_ff^-1 A_fs over the body states, which come first."""
-    n = S.LINEAR_BODY_SIZE
-    return a[:n, :n] - a[:n, n:] @ np.linalg.solve(a[n:, n:], a[n:, :n])
 
 
 class _TaylorTerms:

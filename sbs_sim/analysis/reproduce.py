@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.export import plain
-from sbs_sim.analysis.linearize import LinearModel, linearize
+from sbs_sim.analysis.linearize import LinearModel, linearize, settle
 from sbs_sim.analysis.modes import Mode, first_matrix_modes, modes
 from sbs_sim.analysis.paper_tables import TABLES, Cell, Row, Table, Value, contents, printed_tables
 from sbs_sim.analysis.reproduce_remarks import UNEXPLAINED, general_remarks, remark_on
@@ -412,12 +412,12 @@ def _tilt_values(computed: _Computed, group: str, key: str) -> dict[str, Any]:
 
 
 def _settled(model: LinearModel, motion: str, size: float) -> dict[str, float]:
-    """Rotor and inflow states that a held motion of the body leads to: x_f0 - A_ff^-1 A_f,motion * size."""
-    fast = [i for i, name in enumerate(model.state_names) if name not in LINEAR_BODY_NAMES]
-    column = model.a[fast][:, model.state_names.index(motion)]
-    change = -size * np.linalg.solve(model.a[np.ix_(fast, fast)], column)
+    """Rotor and inflow states that a held motion of the body leads to."""
+    slow = [model.state_names.index(name) for name in LINEAR_BODY_NAMES]
+    _, _, by_state, _ = settle(model.a, model.b, slow)
+    change = size * by_state[:, LINEAR_BODY_NAMES.index(motion)]
     trim = dict(zip(model.trim.state_names, model.trim.state, strict=True))
-    names = [model.state_names[i] for i in fast]
+    names = [name for name in model.state_names if name not in LINEAR_BODY_NAMES]
     return {name: float(trim[name] + own) for name, own in zip(names, change, strict=True)}
 
 

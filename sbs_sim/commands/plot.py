@@ -27,11 +27,15 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
+    from sbs_sim.analysis.export import check_target
     from sbs_sim.recording import read
-    from sbs_sim.recording.plot import plot
+    from sbs_sim.recording.plot import SUFFIXES, plot
 
+    targets = arguments.out or [Path(arguments.file.name).with_suffix(".png")]
+    for path in targets:
+        check_target(path, SUFFIXES)
     log = read(arguments.file)
     if not log.complete:
         print(f"{arguments.file} is not complete: {'; '.join(log.reasons)}", file=sys.stderr)
-    for path in arguments.out or [Path(arguments.file.name).with_suffix(".png")]:
+    for path in targets:
         print(f"written: {plot(log, path)}")

@@ -18,13 +18,12 @@ from typing import TYPE_CHECKING
 import rclpy.utilities
 
 from sbs_sim.errors import SbsError
-from sbs_sim.nodes.host import Component, run
+from sbs_sim.nodes.host import DISCOVERY, Component, run
 
 if TYPE_CHECKING:
     from sbs_sim.nodes.cockpit_node import Cockpit
 
 HOST, PORT = "127.0.0.1", 8080
-DISCOVERY = 1.5  # s in which a simulator that flies already is found
 END_PATIENCE = 15.0  # s that a simulator may take to close its log
 START_HEIGHT = 10.0  # m above the origin, of a flight that the cockpit starts
 DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG

@@ -28,6 +28,7 @@ STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 HEALTH_PERIOD = 1.0  # s of wall time between diagnostics
 COMPLAINT_PERIOD = 1.0  # s between complaints about bad input
 STOP_PERIOD = 0.2  # s, longest time that a thread takes to see the end
+DISCOVERY = 1.5  # s in which others that run already are found
 END_PATIENCE = 3.0  # s that a thread may take to end
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -7,12 +7,14 @@ reads logs of other writers too, as long as their message types are installed.
 import argparse
 import importlib
 import itertools
+import math
 import signal
 import sys
 import threading
 import time
 import traceback
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,17 +33,23 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
 from sbs_sim.nodes.executables import INTERRUPTED
-from sbs_sim.nodes.host import EVENT_QOS, STATE_QOS, Component, run
+from sbs_sim.nodes.host import DISCOVERY, EVENT_QOS, STATE_QOS, Component, run
 from sbs_sim.nodes.recorder import Recorder, definition_file
 from sbs_sim.recording import Log, message_definition, read, recover
 from sbs_sim.recording.definitions import parse
-from sbs_sim.recording.flight import TOLERANCE, Flight, flight_of, verify
+from sbs_sim.recording.flight import TOLERANCE, Flight, flight_of, verify, whole_until
 from sbs_sim.recording.playback import Playback
 from sbs_sim.simulation import Simulation, refly
 
 LARGEST_RATE = 1000.0
 LONGEST_DELAY = 3600.0  # s
 EMPTY = "structure_needs_at_least_one_member"
+# of which every node may be a publisher
+SHARED = frozenset(("/rosout", "/parameter_events", "/diagnostics", "/tf", "/tf_static"))
+PLAYING = ("rate", "start", "end", "loop", "topics", "delay")
+ROUNDING = 1e-6  # s
+LOOK_PERIOD = 0.05  # s between looks at who else is there
+LOOKOUT = 10.0  # s of playing in which somebody may still be discovered: most are at once, but not on a busy machine
 SHORTEST_PASS = 0.05  # s of wall time: a loop over an instant is no flood
 RECOVERED = ".recovered.mcap"
 
@@ -61,7 +69,7 @@ class Replay(Component):
     topics : sequence of str
         Those to publish; all if empty.
     delay : float
-        Longest time to wait until somebody listens to every topic [s].
+        Longest time to wait until somebody listens to every topic [s]; that in which others are found is waited anyway.
     ended : threading.Event
         Set at the end of the log.
 
@@ -92,6 +100,7 @@ class Replay(Component):
         self._wake = threading.Condition()
         self._paused = self._stopping = False
         self._ended = ended
+        self._next_look, self._lookout_end = 0.0, math.inf
         self.create_service(SetBool, "pause", self._on_pause)
         self._thread = threading.Thread(target=self._play, name="replay", daemon=True)
         self._thread.start()
@@ -132,7 +141,7 @@ class Replay(Component):
 
     def _play(self) -> None:
         try:
-            self._await_listeners()
+            self._await_others()
             for _ in itertools.count() if self._loop else range(1):
                 begun = time.monotonic()
                 if not self._play_once() or self._wait_until(begun + SHORTEST_PASS) is None:
@@ -145,14 +154,28 @@ class Replay(Component):
         finally:
             self._ended.set()
 
-    def _await_listeners(self) -> None:
-        """Give those who listen already the time to be discovered, so that they get the beginning."""
-        end = time.monotonic() + self._delay
+    def _await_others(self) -> None:
+        """Give others the time to be discovered: who publishes the same, and who is to get the beginning."""
+        begin = time.monotonic()
+        patience = DISCOVERY
         with self._wake:
-            while not self._stopping and (left := end - time.monotonic()) > 0:
-                self._wake.wait(min(left, 0.05))
-                if all(output.get_subscription_count() for output in self._outputs.values()):
-                    return
+            while not self._stopping and (left := begin + patience - time.monotonic()) > 0:
+                self._wake.wait(min(left, LOOK_PERIOD))
+                self._look_out()
+                heard = all(output.get_subscription_count() for output in self._outputs.values())
+                patience = DISCOVERY if heard else max(DISCOVERY, self._delay)
+        self._lookout_end = time.monotonic() + LOOKOUT
+
+    def _look_out(self) -> None:
+        """Raise SbsError if somebody else publishes a topic too: recorded commands would fly a simulator."""
+        now = time.monotonic()
+        if not self._next_look <= now < self._lookout_end:
+            return
+        self._next_look = now + LOOK_PERIOD
+        for name in sorted({output.topic_name for output in self._outputs.values()} - SHARED):
+            if self.count_publishers(name) > 1:
+                remedy = "--topics chooses others, another ROS_DOMAIN_ID keeps apart"
+                raise SbsError(f"somebody else publishes {name} already: {remedy}")
 
     def _play_once(self) -> bool:
         """Publish the log from start to end; false if that was broken off."""
@@ -167,6 +190,7 @@ class Replay(Component):
             if held is None:
                 return False
             anchor += held
+            self._look_out()
             self._outputs[channel].publish(data)
         if anchor is None:
             raise RecordingError(f"{self._playback.path}: there is nothing to play in this part or on these topics")
@@ -257,7 +281,9 @@ def _one_of(policy: Any, value: Any, first: tuple[str, int]) -> Any:
 # --- other aircraft, same commands ------------------------------------------------------------------------------
 
 
-def fly_with(flight: Flight, changes: Sequence[str], output: Path, stop: threading.Event) -> tuple[Path, int]:
+def fly_with(
+    flight: Flight, changes: Sequence[str], last: int, output: Path, stop: threading.Event
+) -> tuple[Path, int]:
     """Fly the events of a flight with a changed aircraft into a new log.
 
     Parameters
@@ -265,6 +291,8 @@ def fly_with(flight: Flight, changes: Sequence[str], output: Path, stop: threadi
     flight : Flight
     changes : sequence of str
         "PATH=VALUE" each, see `Aircraft.with_value`.
+    last : int
+        Step to end at.
     output : Path
     stop : threading.Event
         Ends the flight with a KeyboardInterrupt.
@@ -273,7 +301,7 @@ def fly_with(flight: Flight, changes: Sequence[str], output: Path, stop: threadi
     -------
     path : Path
     steps : int
-        Flown; fewer than recorded if the changed aircraft ended in a fault.
+        Flown; fewer than wanted if the changed aircraft ended in a fault.
 
     Raises
     ------
@@ -289,7 +317,7 @@ def fly_with(flight: Flight, changes: Sequence[str], output: Path, stop: threadi
     simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **flight.options)
     log = Recorder(str(output), simulation, {"with": list(changes)})
     try:
-        steps = _write_flight(flight, aircraft, simulation.step_size, log, stop)
+        steps = _write_flight(replace(flight, aircraft=aircraft), last, simulation.step_size, log, stop)
     except BaseException:  # an interruption too: half a flight looks like a whole one
         log.discard()
         raise
@@ -317,9 +345,9 @@ def changed(aircraft: Aircraft, change: str) -> Aircraft:
     return aircraft.with_value(path, value)
 
 
-def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Recorder, stop: threading.Event) -> int:
-    """Fly and record; the number of the last step."""
-    made = StateMessages(aircraft)
+def _write_flight(flight: Flight, last: int, step_size: float, log: Recorder, stop: threading.Event) -> int:
+    """Fly to a step and record; the number of the last step."""
+    made = StateMessages(flight.aircraft)
     kinds = {
         "/clock": (Clock, STATE_QOS),
         "/events": (FlightEvent, EVENT_QOS),
@@ -333,11 +361,12 @@ def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Rec
     def keep(topic: str, message: Any, now: float) -> None:
         log.write(places[topic], now, serialize_message(message), wait=True)
 
-    for event in flight.events:
+    events = [event for event in flight.events if event.step <= last]
+    for event in events:
         keep("/events", event_message(event, step_size), event.step * step_size)
-    last = 0
+    flown = 0
     try:
-        for snapshot in refly(aircraft, flight.events, int(flight.steps[-1]), **flight.options):
+        for snapshot in refly(flight.aircraft, events, last, **flight.options):
             if stop.is_set():
                 raise KeyboardInterrupt
             made.fill(snapshot)
@@ -345,10 +374,10 @@ def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Rec
             for topic, message in (("/state", made.state), ("/rotors", made.rotors), ("/inflow", made.inflow)):
                 keep(topic, message, snapshot.time)
             keep("/odom", made.odom, snapshot.time)
-            last = snapshot.step
+            flown = snapshot.step
     except SbsError as error:
         print(f"the flight ended early: {error}", file=sys.stderr)
-    return last
+    return flown
 
 
 # --- command line -----------------------------------------------------------------------------------------------
@@ -380,11 +409,16 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("file", type=Path, help="MCAP log")
     parser.add_argument("--rate", type=float, default=1.0, help="recorded time over wall time, 0.001 to 1000")
     parser.add_argument("--start", type=float, default=0.0, help="where to begin [s after the first message]")
-    parser.add_argument("--end", type=float, default=float("inf"), help="where to end [s after the first message]")
+    parser.add_argument(
+        "--end", type=float, default=float("inf"), help="where to end [s after the first message]; with --with too"
+    )
     parser.add_argument("--loop", action="store_true", help="begin again at the end")
     parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, all if not given; after FILE")
     parser.add_argument(
-        "--delay", type=float, default=1.0, help="longest wait before the first message until every topic is heard [s]"
+        "--delay",
+        type=float,
+        default=DISCOVERY,
+        help=f"longest wait before the first message until every topic is heard [s]; {DISCOVERY:g} are waited anyway",
     )
     one = parser.add_mutually_exclusive_group()
     one.add_argument("--verify", action="store_true", help="fly the log again and compare every state bit for bit")
@@ -403,6 +437,17 @@ def make_parser() -> argparse.ArgumentParser:
 def _parse(arguments: list[str]) -> argparse.Namespace:
     parser = make_parser()
     options = parser.parse_args(arguments)
+    _check(parser, options)
+    return options
+
+
+def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """End with a usage error where options are out of range or do not go together."""
+    modes = {"--verify": options.verify, "--recover": options.recover, "--with": options.changes}
+    for mode in (mode for mode, wanted in modes.items() if wanted):
+        for name in PLAYING:
+            if getattr(options, name) != parser.get_default(name) and (mode, name) != ("--with", "end"):
+                parser.error(f"--{name}: not allowed with {mode}")
     if not 1.0 / LARGEST_RATE <= options.rate <= LARGEST_RATE:
         parser.error(f"--rate {options.rate}: allowed are {1 / LARGEST_RATE:g} to {LARGEST_RATE:g}")
     if not 0.0 <= options.delay <= LONGEST_DELAY:
@@ -413,7 +458,6 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
         parser.error("--output: allowed with --recover and --with")
     if not 0.0 <= options.start <= options.end:
         parser.error(f"--start {options.start}: allowed are 0 to --end")
-    return options
 
 
 def _replay(options: argparse.Namespace) -> int:
@@ -448,18 +492,16 @@ def _recover(path: Path, output: str) -> int:
     return 3
 
 
-def _read(path: Path) -> Log:
-    """A log; that something is missing in it is told."""
-    log = read(path)
+def _tell_if_broken(log: Log) -> None:
     if not log.complete:
-        print(f"{path} is not whole: {log.reasons[0]}", file=sys.stderr)
-    return log
+        print(f"{log.path} is not whole: {log.reasons[0]}", file=sys.stderr)
 
 
 def _verify(path: Path) -> int:
     """0 if every state came again as it should."""
-    flight = flight_of(_read(path))
-    found = verify(flight)
+    log = read(path)
+    _tell_if_broken(log)
+    found = verify(flight_of(log))
     for name, (recorded, here) in found.other_versions.items():
         print(f"other {name}: {recorded or 'unknown'} recorded, {here} here")
     if found.identical:
@@ -480,11 +522,20 @@ def _verify(path: Path) -> int:
 
 
 def _fly_with(options: argparse.Namespace) -> int:
-    flight = flight_of(_read(options.file))
+    """Fly the commands again, if they are all there."""
+    log = read(options.file)
+    flight = flight_of(log)
+    wanted = flight.steps[flight.steps * flight.step_size <= options.end + ROUNDING]
+    last = int(wanted[-1]) if len(wanted) else 0
+    whole = whole_until(log)
+    if last * flight.step_size > whole + ROUNDING:
+        end = math.floor((whole + ROUNDING) * 1e3) * 1e-3
+        raise RecordingError(f"{log.path} lacks commands after {end:.3f} s: --end {end:.3f} flies those before")
+    _tell_if_broken(log)
     stop = threading.Event()  # an exception would be lost in the callbacks of the compiler
     signal.signal(signal.SIGINT, lambda *_: stop.set())
-    path, steps = fly_with(flight, options.changes, Path(options.output), stop)
-    print(f"{path}: {steps} of {flight.steps[-1]} steps")
+    path, steps = fly_with(flight, options.changes, last, Path(options.output), stop)
+    print(f"{path}: {steps} of {last} steps")
     return 0
 
 

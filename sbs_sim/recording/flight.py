@@ -2,6 +2,7 @@
 
 import io
 import itertools
+import math
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError
 from sbs_sim.model.wind import Wind
 from sbs_sim.recording.log import Log, Topic
+from sbs_sim.recording.mcap_file import RECOVERY
 from sbs_sim.simulation import Event, Simulation, Snapshot, refly
 from sbs_sim.versions import versions
 
@@ -47,6 +49,8 @@ class Flight:
         Integration step of each recorded state.
     states : ndarray, shape (n, size)
         Simulation states.
+    step_size : float
+        [s]
     versions : dict of str to str
         Of everything that decides a result.
     folder : TemporaryDirectory
@@ -58,6 +62,7 @@ class Flight:
     events: tuple[Event, ...]
     steps: IntArray
     states: Array
+    step_size: float
     versions: dict[str, str]
     folder: "tempfile.TemporaryDirectory[str]" = field(repr=False)
 
@@ -145,11 +150,31 @@ def flight_of(log: Log) -> Flight:
             raise RecordingError("the aircraft in the log is not the one that was flown: its hash differs")
         if not len(log["events"].time) or not len(log["state"].time):
             raise RecordingError("the log holds no flight of sbs_sim: it has no events or no states")
-        steps, states = _states(log, aircraft, float(simulation["step_size"]))
+        step_size = float(simulation["step_size"])
+        steps, states = _states(log, aircraft, step_size)
         options = {name: _option(simulation[name], kind) for name, kind in OPTIONS.items()}
-        return Flight(aircraft, options, _events(log, aircraft), steps, states, dict(recorded), folder)
+        return Flight(aircraft, options, _events(log, aircraft), steps, states, step_size, dict(recorded), folder)
     except KeyError as error:
         raise RecordingError(f"the log holds no flight of sbs_sim: {error.args[0]} is missing") from None
+
+
+def whole_until(log: Log) -> float:
+    """Time up to which the log holds every command of its flight [s]; infinite if it holds all that were recorded.
+
+    The messages of a topic are numbered. Events that are missing between others are found by that; some that are
+    missing behind the last one may have been wherever a damaged log lacks the messages that follow upon them.
+    """
+    events, states = log["events"], log["state"]
+    lost = np.flatnonzero(np.diff(events.sequence) != 1)
+    if len(lost):
+        return float(states.time[states.time < events.time[lost[0]]].max(initial=0.0))
+    if log.complete and log.metadata.get(RECOVERY, {}).get("complete") != "false":
+        return math.inf
+    holes: list[float] = []
+    for topic in [log[name] for name in ("state", "status") if name in log]:
+        is_hole = (np.diff(topic.sequence) != 1) & (topic.time[1:] > events.time[-1])
+        holes += topic.time[:-1][is_hole].tolist()
+    return min(holes, default=math.inf)
 
 
 def _option(text: str, kind: type) -> Any:

@@ -1,7 +1,7 @@
 """Reading a recording into arrays: `log["state"]["position.x"]`."""
 
 import importlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,8 @@ from sbs_sim.recording.cdr import Columns, decode
 from sbs_sim.recording.definitions import Definitions, Units, parse, short_name
 from sbs_sim.recording.mcap_file import START
 from sbs_sim.recording.scan import Content, Scan, Source, scan
+
+Row = tuple[int, int, bytes]  # log time [ns], number, data
 
 
 class Topic(Mapping[str, NDArray[Any]]):
@@ -30,13 +32,16 @@ class Topic(Mapping[str, NDArray[Any]]):
         package/msg/Type
     time_ns : ndarray of int64, shape (n,)
         Time of each message [ns].
+    sequence : ndarray of int64, shape (n,)
+        Number of each message; in logs of ours a gap tells of lost ones.
     """
 
-    def __init__(self, name: str, schema: Schema, times: list[int], messages: list[bytes]) -> None:
+    def __init__(self, name: str, schema: Schema, rows: Sequence[Row]) -> None:
         self.name, self.type = name, schema.name
-        self.time_ns = np.array(times, np.uint64).view(np.int64)
+        self.time_ns = np.array([row[0] for row in rows], np.uint64).view(np.int64)
+        self.sequence = np.array([row[1] for row in rows], np.int64)
         self._schema = schema
-        self._messages = messages
+        self._messages = [row[2] for row in rows]
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -166,29 +171,25 @@ def read(path: str | Path) -> Log:
     RecordingError
         The file cannot be read, or nothing in it is whole.
     """
-    times: dict[int, list[int]] = {}
-    messages: dict[int, list[bytes]] = {}
+    messages: dict[int, list[Row]] = {}
 
     def take(content: Content) -> None:
         data = content.data
-        for channel, _, log_time, _, start, end in content.messages:
-            if channel not in times:
-                times[channel], messages[channel] = [], []
-            times[channel].append(log_time)
-            messages[channel].append(data[start:end])
+        for channel, sequence, log_time, _, start, end in content.messages:
+            messages.setdefault(channel, []).append((log_time, sequence, data[start:end]))
 
     with Source(Path(path)) as source:
         found = scan(source, take)
     require_something(source, found)
-    for number in times.keys() - found.channels.keys():
-        found.reasons.append(f"{len(times[number])} messages of a topic whose definition is lost")
+    for number in messages.keys() - found.channels.keys():
+        found.reasons.append(f"{len(messages[number])} messages of a topic whose definition is lost")
         found.complete = False
     topics: dict[str, Topic] = {}
     for topic, schema, numbers in _by_topic(source, found):
-        rows = [row for number in numbers for row in zip(times.get(number, ()), messages.get(number, ()), strict=True)]
+        rows = [row for number in numbers for row in messages.get(number, ())]
         if len(numbers) > 1:
             rows.sort(key=lambda row: row[0])
-        topics[topic] = Topic(topic, schema, [row[0] for row in rows], [row[1] for row in rows])
+        topics[topic] = Topic(topic, schema, rows)
     return Log(source.path, found, topics)
 
 

@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from sbs_sim.analysis.export import check_target, write
 from sbs_sim.errors import RecordingError
 from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
@@ -49,22 +50,19 @@ def plot(log: Log, path: str | Path) -> Path:
     Raises
     ------
     RecordingError
-        Another suffix, nothing to draw, or the file cannot be written.
+        Nothing to draw.
+    ExportError
+        Another suffix, or a file that cannot be written.
     """
     target = Path(path)
-    if target.suffix not in SUFFIXES:
-        raise RecordingError(f"{target}: allowed are {', '.join(SUFFIXES)}")
+    check_target(target, SUFFIXES)
     figure = flight_figure(log)
-    kind = "png" if target.suffix == ".png" else "svg"
+    suffix = target.suffix.lower()
+    kind = "png" if suffix == ".png" else "svg"
     with rc_context(SETTINGS), io.BytesIO() as stream:
         figure.savefig(stream, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
         data = stream.getvalue()
-    if target.suffix == ".html":
-        data = _page(log, data.decode()).encode()
-    try:
-        target.write_bytes(data)
-    except OSError as error:
-        raise RecordingError(f"cannot write {target}: {error.strerror}") from None
+    write(target, _page(log, data.decode()) if suffix == ".html" else data)
     return target
 
 

@@ -5,6 +5,7 @@ Machines are noisy: every figure is a median, with the spread beside it where th
 
 import argparse
 import json
+import math
 import os
 import platform
 import statistics
@@ -20,6 +21,7 @@ from typing import Any
 from analysis_rows import analysis_rows
 from model_rows import model_rows
 from node_rows import node_rows
+from peers import peer_rows
 
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTABLES = ROOT / "install" / "sbs_sim" / "lib" / "sbs_sim"
@@ -38,12 +40,14 @@ def main() -> None:
     )
     parser.add_argument("--cold", action="store_true", help="also time a start without caches (half a minute)")
     arguments = parser.parse_args()
-    rows: list[Row] = [*model_rows(timed), *analysis_rows(timed), *start_rows(arguments.cold)]
+    rows: list[Row] = [*model_rows(timed), *analysis_rows(timed), *peer_rows(), *start_rows(arguments.cold)]
     if arguments.node > 0:
         rows += node_rows(arguments.node, arguments.memory)
     print_table(rows)
     if arguments.json:
-        figures = {name: {"value": value, "unit": unit, "note": note} for name, value, unit, note in rows}
+        # JSON has no word for the figure of what is not installed.
+        present = (row for row in rows if math.isfinite(row[1]))
+        figures = {name: {"value": value, "unit": unit, "note": note} for name, value, unit, note in present}
         arguments.json.write_text(json.dumps({"machine": machine(), "figures": figures}, indent=2) + "\n")
 
 

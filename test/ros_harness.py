@@ -63,6 +63,12 @@ class Process:
         """What it has printed so far."""
         return self.log.read_text()
 
+    def catches(self, number: signal.Signals) -> bool:
+        """True if it has a handler for a signal, which Python has for SIGINT alone (Linux, proc(5))."""
+        status = Path(f"/proc/{self.pid}/status").read_text()
+        caught = int(status.split("SigCgt:")[1].split()[0], 16)
+        return bool(caught >> (number - 1) & 1)
+
     @property
     def running(self) -> bool:
         """True while it has not ended."""

@@ -15,6 +15,8 @@ from multiprocessing import get_context
 from sbs_sim import Aircraft, Case, simulate_batch, trim
 from sbs_sim.model.wind import Wind
 
+Row = tuple[str, float, str, str]
+
 
 def fly(first: int, count: int, duration: float, threads: int) -> int:
     """Fly gust flights with the seeds from `first` on; how many there were."""
@@ -37,27 +39,35 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=9, help="of which medians are taken (default: 9)")
     parser.add_argument("--threads", type=int, default=cores, help=f"beside one (default: {cores}, the cores)")
     given = parser.parse_args()
-    many, flights = given.threads, given.flights
+    print(f"load {os.getloadavg()[0]:.2f}")
+    for name, value, unit, note in batch_rows(given.flights, given.duration, given.rounds, given.threads):
+        print(f"{name:40} {value:8.4g} {unit:9} {note}")
+
+
+def batch_rows(flights: int, duration: float, rounds: int, many: int) -> list[Row]:
+    """Rows of the table: flights per second one by one and side by side, and the share of perfect scaling."""
     with ProcessPoolExecutor(many, get_context("spawn")) as pool:
 
         def processes() -> int:
-            parts = [pool.submit(fly, i * flights, flights, given.duration, 1) for i in range(many)]
+            parts = [pool.submit(fly, i * flights, flights, duration, 1) for i in range(many)]
             return sum(part.result() for part in parts)
 
         ways: dict[str, Callable[[], int]] = {
-            "1 thread": lambda: fly(0, flights, given.duration, 1),
-            f"{many} threads": lambda: fly(0, many * flights, given.duration, many),
+            "1 thread": lambda: fly(0, flights, duration, 1),
+            f"{many} threads": lambda: fly(0, many * flights, duration, many),
             f"{many} processes": processes,
         }
-        rates = measured(ways, given.rounds)
-    print(f"flights of {given.duration:g} s, medians of {given.rounds} rounds, load {os.getloadavg()[0]:.2f}")
+        rates = measured(ways, rounds)
+    rows: list[Row] = []
     for name, found in rates.items():
         rate = statistics.median(found)
-        print(f"{name}: {rate:.2f} flights/s, {rate * given.duration:.1f} x real time")
+        rows.append((f"batch, {name}", rate, "flights/s", f"of {duration:g} s: {rate * duration:.0f} x real time"))
     one, threads, apart = rates.values()
     for name, perfect in ((f"{many} x 1 thread", [many * rate for rate in one]), (f"{many} processes", apart)):
         shares = [100 * rate / best for rate, best in zip(threads, perfect, strict=True)]
-        print(f"{many} threads, of {name}: {statistics.median(shares):.1f} %, best round {max(shares):.1f} %")
+        note = f"median of {rounds} rounds, best {max(shares):.0f} %"
+        rows.append((f"  {many} threads, of {name}", statistics.median(shares), "%", note))
+    return rows
 
 
 def measured(ways: dict[str, Callable[[], int]], rounds: int) -> dict[str, list[float]]:

@@ -28,6 +28,7 @@ TYPES = {
     "/status": "sbs_msgs/msg/SimulationStatus",
     "/clock": "rosgraph_msgs/msg/Clock",
 }
+Row = tuple[str, float, str, str]
 TICK = 0.01  # s
 NANOSECONDS = 10_000_000
 
@@ -38,10 +39,15 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=10.0, help="flight time of the file to read")
     parser.add_argument("--seconds", type=float, default=20.0, help="wall time to record in real time")
     arguments = parser.parse_args()
+    for name, value, unit, note in recording_rows(arguments.seconds, arguments.minutes):
+        print(f"{name:32} {value:10.3g} {unit:12} {note}")
+
+
+def recording_rows(seconds: float, minutes: float) -> list[Row]:
+    """Rows of the table: wall time to record in real time, flight time of the file to read."""
     flown = fly(1000)
     with tempfile.TemporaryDirectory() as folder:
-        write_rows(Path(folder), flown, arguments.seconds)
-        read_rows(Path(folder), flown, round(arguments.minutes * 60 / TICK))
+        return [*write_rows(Path(folder), flown, seconds), *read_rows(Path(folder), flown, round(minutes * 60 / TICK))]
 
 
 def fly(ticks: int) -> list[list[bytes]]:
@@ -73,7 +79,7 @@ def new_log(path: Path) -> tuple[LogWriter, list[int]]:
     ]
 
 
-def write_rows(folder: Path, flown: list[list[bytes]], seconds: float) -> None:
+def write_rows(folder: Path, flown: list[list[bytes]], seconds: float) -> list[Row]:
     """Price of a message, share of a core in real time, and how much goes through."""
     log, channels = new_log(folder / "calls.mcap")
     prices = []
@@ -86,7 +92,8 @@ def write_rows(folder: Path, flown: list[list[bytes]], seconds: float) -> None:
         time.sleep(0.01)
     log.close()
     high = statistics.quantiles(prices, n=20)[-1]
-    row("write, in the calling thread", statistics.median(prices) * 1e6, "us", f"95 % of all below {high * 1e6:.1f} us")
+    note = f"95 % of all below {high * 1e6:.1f} us"
+    rows: list[Row] = [("log: write, in the calling thread", statistics.median(prices) * 1e6, "us", note)]
 
     idle = cpu_of(lambda tick, number: None, flown, seconds)
     log, channels = new_log(folder / "real_time.mcap")
@@ -97,12 +104,8 @@ def write_rows(folder: Path, flown: list[list[bytes]], seconds: float) -> None:
 
     busy = cpu_of(write_tick, flown, seconds)
     log.close()
-    row(
-        "recording 600 messages/s",
-        (busy - idle) * 100,
-        "% of a core",
-        f"{busy * 100:.2f} % less {idle * 100:.2f} % idle",
-    )
+    note = f"of a core; {busy * 100:.2f} % less {idle * 100:.2f} % idle"
+    rows.append(("log: 600 messages/s", (busy - idle) * 100, "%", note))
 
     log, channels = new_log(folder / "throughput.mcap")
     count, size, begun = 50_000, 0, time.perf_counter()
@@ -112,7 +115,8 @@ def write_rows(folder: Path, flown: list[list[bytes]], seconds: float) -> None:
             size += len(data)
     log.close(60.0)
     took = time.perf_counter() - begun
-    row("throughput", count * len(TYPES) / took, "messages/s", f"{size / took / 1e6:.0f} MB/s, {log.dropped} dropped")
+    note = f"messages/s, {size / took / 1e6:.0f} MB/s, {log.dropped} dropped"
+    return [*rows, ("log: throughput", count * len(TYPES) / took, "/s", note)]
 
 
 def cpu_of(act: Callable[[list[bytes], int], None], flown: list[list[bytes]], seconds: float) -> float:
@@ -127,7 +131,7 @@ def cpu_of(act: Callable[[list[bytes], int], None], flown: list[list[bytes]], se
     return (time.process_time() - cpu) / (time.monotonic() - begun)
 
 
-def read_rows(folder: Path, flown: list[list[bytes]], ticks: int) -> None:
+def read_rows(folder: Path, flown: list[list[bytes]], ticks: int) -> list[Row]:
     """Time to read and to recover a long flight."""
     path = folder / "flight.mcap"
     log, channels = new_log(path)
@@ -143,17 +147,11 @@ def read_rows(folder: Path, flown: list[list[bytes]], ticks: int) -> None:
         len(topic)
     decoded = time.perf_counter()
     note = f"{ticks * len(TYPES)} messages, {size:.0f} MB; {scanned - begun:.2f} s of it the file, the rest all fields"
-    row(f"reading {ticks * TICK / 60:g} min of flight", decoded - begun, "s", note)
+    rows: list[Row] = [(f"log: reading {ticks * TICK / 60:g} min", decoded - begun, "s", note)]
     begun = time.perf_counter()
     recover(path, folder / "recovered.mcap")
-    row(
-        f"recovering {ticks * TICK / 60:g} min of flight", time.perf_counter() - begun, "s", "read, written, read again"
-    )
-
-
-def row(name: str, value: float, unit: str, note: str) -> None:
-    """One line of the table."""
-    print(f"{name:32} {value:10.3g} {unit:12} {note}")
+    note = "read, written, read again"
+    return [*rows, (f"log: recovering {ticks * TICK / 60:g} min", time.perf_counter() - begun, "s", note)]
 
 
 if __name__ == "__main__":

@@ -100,7 +100,7 @@ class Start:
 
         try:
             if not attach:
-                _refuse_second_simulator(lookout, since + DISCOVERY)
+                _refuse_second_simulator(lookout, since + 2 * DISCOVERY)  # half of it goes by importing
                 self._simulator = Simulator(self._ros_arguments, self._end)
         finally:
             lookout.destroy_node()

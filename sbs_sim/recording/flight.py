@@ -165,9 +165,10 @@ def whole_until(log: Log) -> float:
     missing behind the last one may have been wherever a damaged log lacks the messages that follow upon them.
     """
     events, states = log["events"], log["state"]
-    lost = np.flatnonzero(np.diff(events.sequence) != 1)
-    if len(lost):
-        return float(states.time[states.time < events.time[lost[0]]].max(initial=0.0))
+    after_gap = np.flatnonzero(np.diff(events.sequence, prepend=0) != 1)
+    if len(after_gap):
+        last_known = events.time[after_gap[0] - 1] if after_gap[0] else 0.0
+        return float(states.time[states.time < last_known].max(initial=0.0))
     if log.complete and log.metadata.get(RECOVERY, {}).get("complete") != "false":
         return math.inf
     holes: list[float] = []

@@ -8,6 +8,7 @@ import hashlib
 import itertools
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft_values import places, replaced, separate, value_at
 from sbs_sim.errors import AircraftError, AirfoilError
 from sbs_sim.model import params as P
@@ -25,6 +27,9 @@ from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES, StateLayout
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
+
+LARGEST_FILE = 1 << 18  # bytes; one with 16 rotors has 20 000
+MOST_VALUES = 10_000  # of a file; aliases of aliases make billions of a few lines
 
 # what a schema calls its types, in words
 TYPE_WORDS = {
@@ -201,6 +206,7 @@ class Aircraft:
         AircraftError
             One line that names the file and every wrong key with its value and what is allowed.
         """
+        checks.path("aircraft", path_or_name, AircraftError)
         path = _find(path_or_name, "aircraft", ".yaml", Path())
         try:
             return cls.from_dict(_read_yaml(path), path.parent)
@@ -223,11 +229,12 @@ class Aircraft:
         AircraftError
             See `load`.
         """
-        return cls._made_of(data, folder or Path.cwd())
+        return cls._made_of(data, Path.cwd() if folder is None else checks.path("folder", folder, AircraftError))
 
     @classmethod
     def _made_of(cls, data: Any, folder: Path, similar: "Aircraft | None" = None) -> "Aircraft":
         """Checked aircraft of a mapping, with the airfoil tables of a similar one where they are the same."""
+        _check_size(data)
         _check_schema(data)
         data = separate(data)
         rotors = tuple(_rotor(entry) for entry in data["rotors"])
@@ -286,7 +293,7 @@ class Aircraft:
             return self._made_of(data, self.folder, self)
         except AircraftError as error:
             named = str(error).startswith(f"{path} = ")
-            raise AircraftError(f"{error}" if named else f"{path} = {_short(value)}: {error}") from None
+            raise AircraftError(f"{error}" if named else f"{path} = {checks.shown(value)}: {error}") from None
 
     @property
     def layout(self) -> StateLayout:
@@ -443,7 +450,13 @@ def _read_yaml(path: Path) -> Any:
     from ruamel.yaml import YAML  # here, because it is slow to import and needed once
 
     try:
-        return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            text = file.read(LARGEST_FILE + 1)
+        if len(text) > LARGEST_FILE:
+            raise AircraftError(f"the file has more than {LARGEST_FILE} bytes")
+        return YAML(typ="safe", pure=True).load(text.decode("utf-8"))
+    except AircraftError:
+        raise
     except Exception as error:  # the parser lets out all kinds: for "!!int x", a 31st of June, deep nesting
         raise AircraftError("not readable as YAML: " + " ".join(str(error).split())) from None
 
@@ -458,6 +471,30 @@ def _validator() -> Any:
     from jsonschema import Draft202012Validator  # here, because it is slow to import and needed once
 
     return Draft202012Validator(_schema())
+
+
+def _check_size(data: Any) -> None:
+    """Raise AircraftError for more values than any aircraft has, before anything goes through all of them."""
+    try:
+        size = _size(data, {})
+    except RecursionError:
+        raise AircraftError("the file is nested too deeply") from None
+    if size > MOST_VALUES:
+        raise AircraftError(f"the file has {size} values, aliases counted as what they stand for: allowed are {MOST_VALUES}")
+
+
+def _size(node: Any, known: dict[int, int]) -> int:
+    """Number of values in nested mappings and lists; what contains itself counts once."""
+    if isinstance(node, Mapping):
+        parts = [*node.keys(), *node.values()]
+    elif isinstance(node, list | tuple | set | frozenset):
+        parts = list(node)
+    else:  # a number of thousands of digits counts as all of them
+        return 1 + node.bit_length() // 3 if isinstance(node, int) else 1
+    if id(node) not in known:
+        known[id(node)] = 0
+        known[id(node)] = 1 + sum(_size(part, known) for part in parts)
+    return known[id(node)]
 
 
 def _check_schema(data: Any) -> None:
@@ -502,16 +539,11 @@ def _explain(error: Any) -> str:
         "maxItems": f"a list of at most {limit}",
         "minLength": "a text that is not empty",
     }.get(rule, error.message)
-    return f"{path or 'file'} = {_short(value)}: allowed is {allowed}"
+    return f"{path or 'file'} = {checks.shown(value)}: allowed is {allowed}"
 
 
 def _key(key: Any) -> str:
-    return key if isinstance(key, str) and key.isprintable() else _short(key)
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return key if isinstance(key, str) and key.isprintable() else checks.shown(key)
 
 
 def _rotor(entry: dict[str, Any]) -> Rotor:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from sbs_sim import checks
 from sbs_sim.errors import AircraftError
 
 Place = tuple[str | int, ...]
@@ -46,8 +47,8 @@ def places(data: Mapping[str, Any], schema: Mapping[str, Any], path: str) -> lis
     AircraftError
         There is no such place: the message names the part of the path and what is allowed.
     """
-    if not PATH.fullmatch(path):
-        raise AircraftError(f"path = {path!r}: allowed are keys like body.mass, rotors.radius, rotors[0].hub[2]")
+    if not isinstance(path, str) or not PATH.fullmatch(path):
+        raise AircraftError(f"path = {checks.shown(path)}: allowed are keys like body.mass, rotors.radius, rotors[0].hub[2]")
     steps = [int(step["index"]) if step["index"] else step["key"] for step in STEP.finditer(path)]
     return _walk(data, schema, steps, "")
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.model.wind import Wind
@@ -29,6 +30,16 @@ HURRY_TICKS = 10  # the schedule is kept by hurrying up to this many ticks; beyo
 IDLE_PERIOD = 0.1  # s of wall time between reports while paused
 RATE_WINDOW = 1.0  # s of wall time over which the real-time factor is measured
 MOST_STEP_TICKS = 1_000  # some half a second of wall time for which other services wait
+
+
+def checked_pace(real_time_factor: Any) -> float:
+    """A real-time factor, 0 to 1000; SimulationError for another."""
+    return checks.number("real_time_factor", real_time_factor, 0.0, 1000.0, "", SimulationError)
+
+
+def checked_timeout(seconds: Any) -> float:
+    """An age of commands [s], 0 to 1e6; SimulationError for another."""
+    return checks.number("command_timeout", seconds, 0.0, 1e6, "s", SimulationError)
 
 
 @dataclass(frozen=True)
@@ -132,18 +143,15 @@ class FlightLoop:
 
     def set_pace(self, real_time_factor: float) -> None:
         """Set the wanted real-time factor, 0 to 1000."""
-        if not 0.0 <= real_time_factor <= 1000.0:
-            raise SimulationError(f"real_time_factor = {real_time_factor}: allowed are 0 to 1000")
+        pace = checked_pace(real_time_factor)
         with self._wake:
-            self._pace = real_time_factor
+            self._pace = pace
             self._replan = True
             self._wake.notify()
 
     def set_command_timeout(self, seconds: float) -> None:
         """Set the age at which a command counts as timed out [s]; 0 is never."""
-        if not 0.0 <= seconds <= 1e6:
-            raise SimulationError(f"command_timeout = {seconds}: allowed are 0 to 1e+06 s")
-        self._timeout = seconds
+        self._timeout = checked_timeout(seconds)
 
     def command(self, swashplate: ArrayLike) -> None:
         """Set the swashplate angles of all rotors [rad], shape (n_rotors, 3), from the next tick on.
@@ -184,8 +192,7 @@ class FlightLoop:
 
     def step(self, ticks: int) -> float:
         """Fly some ticks while paused and return the simulation time [s] after them."""
-        if not 1 <= ticks <= MOST_STEP_TICKS:
-            raise SimulationError(f"ticks = {ticks}: allowed are 1 to {MOST_STEP_TICKS}")
+        ticks = checks.whole("ticks", ticks, 1, MOST_STEP_TICKS, SimulationError)
         for _ in range(ticks):
             time_after = self.call(self._single_tick)
         return float(time_after)

@@ -9,6 +9,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SimulationError
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
@@ -54,12 +55,11 @@ class Mixer:
         SimulationError
             Not four controls, or one that is not finite or beyond a right angle; the target before stays.
         """
-        values = np.asarray(controls, dtype=float)
+        values = checks.array("controls", controls, SimulationError)
         if values.shape != (len(CONTROL_NAMES),):
             raise SimulationError(f"controls have shape {values.shape}: allowed is ({len(CONTROL_NAMES)},)")
         for name, value in zip(CONTROL_NAMES, values, strict=True):
-            if not abs(value) <= math.pi / 2:  # true for a NaN as well
-                raise SimulationError(f"{name} = {value}: allowed are -1.5708 to 1.5708 rad")
+            checks.number(name, value, -math.pi / 2, math.pi / 2, "rad", SimulationError)
         clipped = np.clip(values, self._low, self._high)
         wanted = self.aircraft.mix(clipped)
         self._target = np.clip(wanted, self._swash_low, self._swash_high)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft_values import unit_of
 from sbs_sim.analysis.export import model_to_dict, trim_to_dict
@@ -231,7 +232,9 @@ def sweep(
     SweepError
         No values, one that is not finite, an unknown parameter, no whole number of workers.
     """
+    checks.instance("aircraft", aircraft, Aircraft, SweepError)
     numbers = _checked_values(values)
+    linear = checks.flag("linear", linear, SweepError)
     _check_parameter(aircraft, parameter)
     condition = {"airspeed": airspeed, "climb_rate": climb_rate, "sideslip": sideslip, "turn_rate": turn_rate}
     fidelity = {"lead_lag": lead_lag, "cyclic_inflow": cyclic_inflow, "azimuth_count": azimuth_count}
@@ -240,10 +243,7 @@ def sweep(
 
 
 def _checked_values(values: ArrayLike) -> list[float]:
-    try:
-        numbers = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise SweepError(f"values = {values!r}: allowed is a list of numbers") from None
+    numbers = checks.array("values", values, SweepError)
     if numbers.ndim != 1 or numbers.size == 0:
         raise SweepError(f"values have the shape {numbers.shape}: allowed is a list of at least one number")
     if not np.isfinite(numbers).all():
@@ -253,6 +253,7 @@ def _checked_values(values: ArrayLike) -> list[float]:
 
 
 def _check_parameter(aircraft: Aircraft, parameter: str) -> None:
+    checks.instance("parameter", parameter, str, SweepError)
     if parameter in CONDITIONS:
         return
     try:
@@ -264,9 +265,7 @@ def _check_parameter(aircraft: Aircraft, parameter: str) -> None:
 def _checked_workers(workers: int | None) -> int:
     if workers is None:
         return len(os.sched_getaffinity(0))
-    if isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= MOST_WORKERS:
-        raise SweepError(f"workers = {workers!r}: allowed are whole numbers from 1 to {MOST_WORKERS}")
-    return workers
+    return checks.whole("workers", workers, 1, MOST_WORKERS, SweepError)
 
 
 def _solve_all(

@@ -480,7 +480,9 @@ def _check_size(data: Any) -> None:
     except RecursionError:
         raise AircraftError("the file is nested too deeply") from None
     if size > MOST_VALUES:
-        raise AircraftError(f"the file has {size} values, aliases counted as what they stand for: allowed are {MOST_VALUES}")
+        raise AircraftError(
+            f"the file has {size} values, aliases counted as what they stand for: allowed are {MOST_VALUES}"
+        )
 
 
 def _size(node: Any, known: dict[int, int]) -> int:
@@ -489,8 +491,10 @@ def _size(node: Any, known: dict[int, int]) -> int:
         parts = [*node.keys(), *node.values()]
     elif isinstance(node, list | tuple | set | frozenset):
         parts = list(node)
-    else:  # a number of thousands of digits counts as all of them
-        return 1 + node.bit_length() // 3 if isinstance(node, int) else 1
+    elif isinstance(node, complex):
+        raise AircraftError(f"{node}: allowed are numbers, texts, lists and mappings")
+    else:  # Python cannot even print a number of thousands of digits
+        return 1 + node.bit_length() if isinstance(node, int) else 1
     if id(node) not in known:
         known[id(node)] = 0
         known[id(node)] = 1 + sum(_size(part, known) for part in parts)

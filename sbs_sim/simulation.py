@@ -18,6 +18,7 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint
 from sbs_sim.errors import SimulationError
+from sbs_sim.mixer import check_controls
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.dynamics import derivative
@@ -523,6 +524,8 @@ def _command(controls: ArrayLike | Callable[[float], ArrayLike]) -> Callable[[in
     rows = np.atleast_2d(checks.array("controls", controls, SimulationError))
     if rows.ndim != 2 or rows.shape[1] != len(S.CONTROL_NAMES) or len(rows) == 0:
         raise SimulationError(f"controls have shape {np.shape(controls)}: allowed are (4,) and (n, 4)")
+    for row in rows:
+        check_controls(row)
     return lambda i, _: rows[min(i, len(rows) - 1)]
 
 
@@ -530,6 +533,7 @@ def _four(values: ArrayLike) -> Array:
     array = checks.array("controls", values, SimulationError)
     if array.shape != (len(S.CONTROL_NAMES),):
         raise SimulationError(f"controls have shape {array.shape}: allowed is (4,)")
+    check_controls(array)
     return array
 
 

@@ -244,7 +244,10 @@ FAILURES = {
     "infinite": (("trim", "--airspeed", "-inf"), "airspeed = -inf: allowed are -100 to 100 m/s"),
     "an exponent": (("trim", "--climb-rate", "-6e1"), "climb_rate = -60.0: allowed are -50 to 50 m/s"),
     "degrees": (("trim", "--sideslip-deg", "200"), "sideslip_deg = 200.0: allowed are -180 to 180 deg"),
-    "degrees by time": (("trim", "--turn-rate-deg", "-2e2"), "turn_rate_deg = -200.0: allowed are -171.887 to 171.887 deg/s"),
+    "degrees by time": (
+        ("trim", "--turn-rate-deg", "-2e2"),
+        "turn_rate_deg = -200.0: allowed are -171.887 to 171.887 deg/s",
+    ),
     "no trim": (("linearize", "--airspeed", "90"), "no trim after "),
     "azimuths": (("trim", "--azimuth-count", "0"), "azimuth_count = 0: allowed are whole numbers from 1 to 1000"),
     "unknown parameter": (("sweep", "body.mas", "1", "2", "2"), "parameter 'body.mas': allowed are airspeed, "),

@@ -5,6 +5,7 @@ Not a node: messages come serialised from the publishers (`sbs_sim.nodes.host.To
 
 import datetime
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from sbs_sim.recording import LogWriter, message_definition, qos_profiles
 from sbs_sim.recording.flight import attachments, simulation_metadata, versions
 from sbs_sim.simulation import Simulation
 
+LONGEST_NAME = 60  # characters of the aircraft's that go into the file's
 CLOSING_TIME = 10.0  # s to get the rest of a log onto the disk
 
 
@@ -96,7 +98,9 @@ def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(f"{folder}: {error.strerror}") from None
-    return folder / f"{begin:%Y-%m-%d_%H-%M-%S}_{aircraft}.mcap"
+    # the name comes from a file that somebody else may have written: it must not lead out of the folder
+    name = re.sub(r"[^\w.-]+", "_", aircraft)[:LONGEST_NAME]
+    return folder / f"{begin:%Y-%m-%d_%H-%M-%S}_{name}.mcap"
 
 
 def definition_file(package: str, place: str) -> Path:

@@ -8,6 +8,7 @@ import argparse
 import contextlib
 import importlib
 import itertools
+import re
 import struct
 import sys
 import threading
@@ -21,6 +22,7 @@ from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.records import Channel, Message
 from nav_msgs.msg import Odometry
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
@@ -40,6 +42,8 @@ from sbs_sim.simulation import Simulation, refly
 LARGEST_RATE = 1000.0
 LONGEST_DELAY = 3600.0  # s
 RECOVERED = ".recovered.mcap"
+DEEPEST = 10_000  # messages that a publisher keeps, whatever a log asks for
+MESSAGE_TYPE = re.compile(r"(?P<package>[a-z][a-z0-9_]*)/(msg/)?(?P<name>[A-Z][A-Za-z0-9]*)")
 
 
 class Replay(Component):
@@ -102,7 +106,10 @@ class Replay(Component):
                 continue
             if channel.topic not in by_topic:
                 qos = recorded_qos(channel.metadata.get("offered_qos_profiles", ""))
-                by_topic[channel.topic] = self.create_publisher(kind, channel.topic, qos)
+                try:
+                    by_topic[channel.topic] = self.create_publisher(kind, channel.topic, qos)
+                except InvalidTopicNameException:
+                    raise RecordingError(f"{self._path}: no topic can be called {channel.topic[:60]!r}") from None
             found[channel.id] = by_topic[channel.topic]
         return found
 
@@ -221,11 +228,12 @@ def _reading(path: Path) -> Iterator[Any]:
 
 def message_class(type_name: str) -> Any:
     """Class of a message type, None if it is not installed."""
-    package, _, name = type_name.partition("/")
+    found = MESSAGE_TYPE.fullmatch(type_name)
     try:
-        return getattr(importlib.import_module(f"{package}.msg"), name.rpartition("/")[2])
+        kind = getattr(importlib.import_module(f"{found['package']}.msg"), found["name"]) if found else None
     except (ImportError, AttributeError):
         return None
+    return kind if hasattr(kind, "get_fields_and_field_types") else None
 
 
 def recorded_qos(profiles: str) -> QoSProfile:
@@ -235,7 +243,7 @@ def recorded_qos(profiles: str) -> QoSProfile:
         keep_all = profile["history"] in ("keep_all", 2)
         return QoSProfile(
             history=HistoryPolicy.KEEP_ALL if keep_all else HistoryPolicy.KEEP_LAST,
-            depth=max(1, int(profile["depth"])),
+            depth=min(max(1, int(profile["depth"])), DEEPEST),
             reliability=_one_of(ReliabilityPolicy, profile["reliability"], ("reliable", 1)),
             durability=_one_of(DurabilityPolicy, profile["durability"], ("transient_local", 1)),
         )

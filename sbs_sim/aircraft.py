@@ -491,8 +491,8 @@ def _size(node: Any, known: dict[int, int]) -> int:
         parts = [*node.keys(), *node.values()]
     elif isinstance(node, list | tuple | set | frozenset):
         parts = list(node)
-    elif isinstance(node, complex):
-        raise AircraftError(f"{node}: allowed are numbers, texts, lists and mappings")
+    elif isinstance(node, complex | np.ndarray):  # the schema cannot even compare them
+        raise AircraftError(f"{checks.shown(node)}: allowed are numbers, texts, lists and mappings")
     else:  # Python cannot even print a number of thousands of digits
         return 1 + node.bit_length() if isinstance(node, int) else 1
     if id(node) not in known:

@@ -113,7 +113,9 @@ def test_a_file_beyond_all_bounds_is_not_read(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "value", [10**5000, 1j, float("nan"), [[[[1]]]] * 3000], ids=["digits", "complex", "nan", "list"]
+    "value",
+    [10**5000, 1j, [np.zeros(2)], float("nan"), [[[[1]]]] * 3000],
+    ids=["digits", "complex", "array", "nan", "list"],
 )
 def test_a_value_that_no_file_could_hold_is_refused(sbs, value):
     refusal(sbs.with_value, "body.mass", value)

@@ -17,7 +17,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import rclpy.utilities
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.records import Channel, Message
@@ -33,7 +32,7 @@ from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
-from sbs_sim.nodes.host import EVENT_QOS, STATE_QOS, Component, run
+from sbs_sim.nodes.host import EVENT_QOS, STATE_QOS, Component, own_arguments, run
 from sbs_sim.nodes.recorder import Recorder
 from sbs_sim.recording import read, recover
 from sbs_sim.recording.flight import TOLERANCE, Flight, flight_of, verify
@@ -350,8 +349,8 @@ def _write_flight(flight: Flight, aircraft: Aircraft, step_size: float, log: Rec
 
 def main(args: list[str] | None = None) -> None:
     """Do with a log what the command line asks for."""
-    options = _parse(rclpy.utilities.remove_ros_args(args)[1:])
     try:
+        options = _parse(own_arguments(args))
         if options.recover:
             sys.exit(_recover(options.file, options.output))
         if options.verify:

@@ -1,11 +1,13 @@
 """Who can reach a running simulator, and what it can be made to do with files."""
 
+import json
 import os
 import re
 import socket
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import psutil
@@ -135,3 +137,71 @@ def test_temporary_files_are_of_the_user_alone(tmp_path, monkeypatch):
     (tmp_path / "a.mcap").write_bytes(doors.SMALL_LOG)
     flight = flight_of(read(tmp_path / "a.mcap"))
     assert os.stat(flight.folder.name).st_mode & 0o077 == 0
+
+
+# --- what is installed ----------------------------------------------------------------------------------------------
+
+PIN = re.compile(
+    r"^(?P<pin>[\w.-]+==[\w.]+)(?P<marker> ; [^\\\n]*)?(?P<hashes>( \\\n    --hash=sha256:[0-9a-f]{64})*)$", re.M
+)
+
+
+def plain_pin(pin):
+    return re.sub(r"[-_.]+", "-", pin.split("==")[0]).lower() + "==" + pin.split("==")[1]
+
+
+@pytest.mark.parametrize("name", ["bootstrap", "runtime", "test"])
+def test_everything_is_installed_by_its_hash(name):
+    wanted = [line for line in (ROOT / "requirements" / f"{name}.txt").read_text().splitlines() if "==" in line]
+    locked = list(PIN.finditer((ROOT / "requirements" / f"{name}.lock").read_text()))
+    pins = sorted(plain_pin(found["pin"]) for found in locked)
+    assert pins == sorted(plain_pin(line.split(" ;")[0]) for line in wanted)
+    assert all(found["hashes"] for found in locked)
+    assert f"-r requirements/{name}.lock" in (ROOT / "run").read_text()
+
+
+ADVISORIES = {
+    "A-1": {"package": "NumPy", "ranges": [[{"introduced": "0"}, {"fixed": "999"}]]},
+    "A-2": {"package": "numpy", "ranges": [[{"introduced": "0"}, {"fixed": "1.0"}]]},
+    "A-3": {"package": "scipy", "ranges": [[{"introduced": "0"}, {"last_affected": "0.1"}, {"introduced": "999"}]]},
+    "A-4": {"package": "not_ours", "ranges": [[{"introduced": "0"}]]},
+    "A-5": {"package": "mpmath", "versions": ["1.3.0"]},
+    "A-6": {"package": "mpmath", "versions": ["1.3.0"], "withdrawn": "2026-01-01T00:00:00Z"},
+}
+
+
+def database(folder, names):
+    path = folder / "all.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name in names:
+            entry = ADVISORIES[name]
+            ranges = [{"type": "ECOSYSTEM", "events": events} for events in entry.get("ranges", [])]
+            affected = {"package": {"name": entry["package"]}, "ranges": ranges, "versions": entry.get("versions", [])}
+            advisory = {"id": name, "affected": [affected]}
+            if "withdrawn" in entry:
+                advisory["withdrawn"] = entry["withdrawn"]
+            archive.writestr(f"{name}.json", json.dumps(advisory))
+    return path
+
+
+def check(*arguments):
+    command = [sys.executable, str(ROOT / "tools" / "check_vulnerabilities.py"), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_known_vulnerabilities_are_found_without_network(tmp_path):
+    ended = check("--database", database(tmp_path, ADVISORIES))
+    assert ended.returncode == 1
+    numpy, mpmath, total = sorted(
+        ended.stdout.splitlines(), key=lambda line: "packages" in line or ("mpmath" in line) / 2
+    )
+    assert re.fullmatch(r"numpy [\d.]+: A-1 \(mended in 999\)", numpy)
+    assert mpmath == "mpmath 1.3.0: A-5"
+    assert total.endswith(" packages, 2 with known vulnerabilities")
+    assert check("--database", database(tmp_path, ["A-2", "A-3", "A-4", "A-6"])).returncode == 0
+
+
+def test_what_could_not_be_compared_is_not_called_sound(tmp_path):
+    ended = check("--database", tmp_path / "nothing.zip")
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("nothing was compared: ")

@@ -33,7 +33,7 @@ import doors  # noqa: E402
 
 from sbs_sim import checks  # noqa: E402
 
-SLOWEST = 20.0  # s that one input may take on a busy machine
+SLOWEST = 60.0  # s that one input may take on a busy machine
 GROWTH = 30e6  # bytes that the simulator may grow by: caches, queues
 BATCH = 500  # inputs between looks at the clock
 

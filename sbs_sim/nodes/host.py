@@ -98,19 +98,6 @@ class Topic:
             self._log.write(self._channel, time, data, wait)
 
 
-class Accepted:
-    """A topic that is listened to: what is accepted of it goes into the log."""
-
-    def __init__(self, node: Node, kind: Any, name: str, qos: QoSProfile, log: Log | None = None) -> None:
-        self._log = log
-        self._channel = log.channel(node.resolve_topic_name(name), kind, qos) if log else 0
-
-    def keep(self, message: Any, time: float) -> None:
-        """Record a message that was accepted at a simulation time [s]."""
-        if self._log is not None:
-            self._log.write(self._channel, time, serialize_message(message))
-
-
 class Component(Node):
     """A node of this package.
 
@@ -139,37 +126,6 @@ class Component(Node):
         else:
             response.success, response.message = True, done
         return response
-
-
-class Refusals:
-    """Counts the messages that a node has refused, and says why, at most once a second.
-
-    Parameters
-    ----------
-    node : Node
-    what : str
-        Name of the messages.
-
-    Attributes
-    ----------
-    count : int
-    """
-
-    def __init__(self, node: Node, what: str) -> None:
-        self._node, self._what = node, what
-        self.count = 0
-        self._last = "none"
-
-    def add(self, reason: Exception) -> None:
-        """Count one."""
-        self.count += 1
-        self._last = str(reason)
-        log = self._node.get_logger()
-        log.warning(f"{self._what} rejected: {reason}", throttle_duration_sec=COMPLAINT_PERIOD)
-
-    def values(self) -> dict[str, Any]:
-        """What diagnostics tell of them."""
-        return {"rejected_messages": self.count, "last_rejection": self._last}
 
 
 def declare(node: Node, parameters: dict[str, Parameter]) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from sbs_sim.model.wind import Wind
 from sbs_sim.simulation import Event, Simulation, Snapshot
 
 QUEUE_LENGTH = 100  # snapshots between the flight and their reader: one second at 100 Hz
+FAST_LENGTH = 2  # the same where the flight waits for its reader
 HURRY_TICKS = 10  # the schedule is kept by hurrying up to this many ticks; beyond, real time is lost for good
 IDLE_PERIOD = 0.1  # s of wall time between reports while paused
 RATE_WINDOW = 1.0  # s of wall time over which the real-time factor is measured
@@ -101,9 +102,9 @@ class FlightLoop:
     def __init__(self, simulation: Simulation, real_time_factor: float = 1.0, command_timeout: float = 0.5) -> None:
         self._simulation = simulation
         self._wake = threading.Condition()
+        self.reports: queue.Queue[Report | None] = queue.Queue(QUEUE_LENGTH)
         self.set_pace(real_time_factor)
         self.set_command_timeout(command_timeout)
-        self.reports: queue.Queue[Report | None] = queue.Queue(QUEUE_LENGTH)
         self._mailbox: collections.deque[tuple[Callable[[], Any], Future[Any]]] = collections.deque()
         self._thread = threading.Thread(target=self._run, name="flight", daemon=True)
         self._playing = True
@@ -144,6 +145,8 @@ class FlightLoop:
     def set_pace(self, real_time_factor: float) -> None:
         """Set the wanted real-time factor, 0 to 1000."""
         pace = checked_pace(real_time_factor)
+        # Where the flight waits for its reader, what waits to be read is how far a controller is behind.
+        self.reports.maxsize = FAST_LENGTH if pace == 0.0 else QUEUE_LENGTH
         with self._wake:
             self._pace = pace
             self._replan = True

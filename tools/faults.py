@@ -112,8 +112,14 @@ class System:
         return False
 
     def trims(self) -> bool:
-        """True if the analysis answers."""
-        return bool(self.client.call(Trim, "trim").success)
+        """True if the analysis answers; what is asked before DDS knows the new one goes to the dead one."""
+        asked = self.client.node.create_client(Trim, "trim")
+        for _ in range(round(LEASE / 2)):
+            answer = asked.call_async(Trim.Request())
+            self.client.spin(2.0)
+            if answer.done():
+                return bool(answer.result().success)
+        return False
 
 
 def _tool(made: World, name: str, *arguments: str, **more: str) -> Any:

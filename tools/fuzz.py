@@ -174,8 +174,11 @@ def _log(live: Any) -> None:
 # --- guided by coverage ---------------------------------------------------------------------------------------------
 
 GUIDED = """
-import sys
+import importlib, pkgutil, sys
 import atheris
+import sbs_sim.model
+for module in pkgutil.iter_modules(sbs_sim.model.__path__, "sbs_sim.model."):
+    importlib.import_module(module.name)  # before: what is instrumented cannot be compiled
 with atheris.instrument_imports(include=["sbs_sim.aircraft", "sbs_sim.recording", "ruamel.yaml", "mcap"]):
     import doors
 check = {"yaml": doors.check_yaml, "mcap": doors.check_log}[sys.argv[1]]

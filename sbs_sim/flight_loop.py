@@ -33,16 +33,6 @@ RATE_WINDOW = 1.0  # s of wall time over which the real-time factor is measured
 MOST_STEP_TICKS = 1_000  # some half a second of wall time for which other services wait
 
 
-def checked_pace(real_time_factor: Any) -> float:
-    """A real-time factor, 0 to 1000; SimulationError for another."""
-    return checks.number("real_time_factor", real_time_factor, 0.0, 1000.0, "", SimulationError)
-
-
-def checked_timeout(seconds: Any) -> float:
-    """An age of commands [s], 0 to 1e6; SimulationError for another."""
-    return checks.number("command_timeout", seconds, 0.0, 1e6, "s", SimulationError)
-
-
 @dataclass(frozen=True)
 class Report:
     """State of the loop when it was handed out, with a snapshot if the aircraft has moved.
@@ -144,7 +134,7 @@ class FlightLoop:
 
     def set_pace(self, real_time_factor: float) -> None:
         """Set the wanted real-time factor, 0 to 1000."""
-        pace = checked_pace(real_time_factor)
+        pace = checks.number("real_time_factor", real_time_factor, 0.0, 1000.0, "", SimulationError)
         # Where the flight waits for its reader, what waits to be read is how far a controller is behind.
         self.reports.maxsize = FAST_LENGTH if pace == 0.0 else QUEUE_LENGTH
         with self._wake:
@@ -154,7 +144,7 @@ class FlightLoop:
 
     def set_command_timeout(self, seconds: float) -> None:
         """Set the age at which a command counts as timed out [s]; 0 is never."""
-        self._timeout = checked_timeout(seconds)
+        self._timeout = checks.number("command_timeout", seconds, 0.0, 1e6, "s", SimulationError)
 
     def command(self, swashplate: ArrayLike) -> None:
         """Set the swashplate angles of all rotors [rad], shape (n_rotors, 3), from the next tick on.

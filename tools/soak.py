@@ -126,7 +126,7 @@ def _hold(made: World, seconds: float) -> tuple[float, float, str]:
             return time_now, farthest, answer.result().message
         time_now = answer.result().sim_time
         first = time_now if first is None else first
-        client.until(lambda: stamp(states[-1]) > time_now - 1e-6, "its state")
+        client.until(lambda flown=time_now: stamp(states[-1]) > flown - 1e-6, "its state")
     return time_now, farthest, ""
 
 

@@ -1,7 +1,6 @@
 """What every executable does alike: start ROS, run nodes, end cleanly; declare parameters; report health."""
 
 import array
-import math
 import os
 import signal
 import sys
@@ -157,8 +156,6 @@ def _declare_one(node: Node, name: str, parameter: Parameter, given: dict[str, R
         value = node.declare_parameter(name, parameter.default, descriptor).value
     except ParameterException:
         raise SbsError(f"parameter {name} = {given[name].value!r}: {allowed}") from None
-    if isinstance(value, float) and not math.isfinite(value):  # within any range, to rclpy
-        raise SbsError(f"parameter {name} = {value}: {allowed}")
     if value is None:  # an empty list on the command line has no type
         raise SbsError(f"parameter {name} is empty: {allowed}")
     return value

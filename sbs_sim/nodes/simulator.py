@@ -16,7 +16,7 @@ from sbs_msgs.srv import Reset, SetWind, Step
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint, trim
 from sbs_sim.errors import SbsError, TrimError
-from sbs_sim.flight_loop import FlightLoop, checked_pace, checked_timeout
+from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.analysis import Analysis
@@ -81,8 +81,7 @@ class Simulator(Component):
         self.create_service(Step, "step", self._on_step)
         self.create_service(Reset, "reset", self._on_reset)
         self.create_service(SetWind, "set_wind", self._on_set_wind)
-        self.add_on_set_parameters_callback(_check_parameters)
-        self.add_post_set_parameters_callback(self._use_parameters)
+        self.add_on_set_parameters_callback(self._on_parameters)
 
     def _make_log(self, simulation: Simulation, values: dict[str, Any]) -> "Recorder | None":
         """Recorder of the flight; None if it is not wanted."""
@@ -160,13 +159,17 @@ class Simulator(Component):
     def _on_set_wind(self, request: SetWind.Request, response: SetWind.Response) -> SetWind.Response:
         return self.answer(response, lambda: self.loop.set_wind(lambda now: wind_of(request, now)), "wind set")
 
-    def _use_parameters(self, parameters: list[Any]) -> None:
-        """Take over what has been set: all that came together had been found right before."""
-        for parameter in parameters:
-            if parameter.name == "real_time_factor":
-                self.loop.set_pace(parameter.value)
-            elif parameter.name == "command_timeout":
-                self.loop.set_command_timeout(parameter.value)
+    def _on_parameters(self, parameters: list[Any]) -> SetParametersResult:
+        """Take over what is set; rclpy has found all that came together to be within its range."""
+        try:
+            for parameter in parameters:
+                if parameter.name == "real_time_factor":
+                    self.loop.set_pace(parameter.value)
+                elif parameter.name == "command_timeout":
+                    self.loop.set_command_timeout(parameter.value)
+        except SbsError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
 
     def stop(self) -> None:
         """End the flight; whoever waits for it is told so."""
@@ -178,19 +181,6 @@ class Simulator(Component):
         if self.log is not None:
             self.log.close()
         super().destroy_node()
-
-
-def _check_parameters(parameters: list[Any]) -> SetParametersResult:
-    """Refuse a value that passes for a number in its range and is none."""
-    try:
-        for parameter in parameters:
-            if parameter.name == "real_time_factor":
-                checked_pace(parameter.value)
-            elif parameter.name == "command_timeout":
-                checked_timeout(parameter.value)
-    except SbsError as error:
-        return SetParametersResult(successful=False, reason=str(error))
-    return SetParametersResult(successful=True)
 
 
 def checked_components(names: list[str]) -> tuple[str, ...]:

@@ -181,7 +181,7 @@ def killed(*victims: str) -> tuple[str, bool]:
         words += [f"{MISSED[v][0]} does not miss {v}" for v, yes in heard.items() if not yes]
         if "simulator" in victims:
             said = replayed(made.parts["simulator"].record, "--recover")
-            words.append(f"log recovered ({said[:60]})")
+            words.append(f"log recovered ({said[:13]})")
         for victim in victims:
             made.start(victim)
         joined = made.flies() and made.trims()
@@ -366,27 +366,24 @@ def neighbours() -> tuple[str, bool]:
 
 def full_disk() -> tuple[str, bool]:
     """The log's disk has room for a megabyte."""
-    with tempfile.TemporaryDirectory() as name:
-        if subprocess.run(
-            ["mount", "-t", "tmpfs", "-o", "size=1m", "none", name], check=False, stderr=subprocess.DEVNULL
-        ).returncode:
+    with tempfile.TemporaryDirectory() as name, tempfile.TemporaryDirectory() as rest:
+        disk = ["mount", "-t", "tmpfs", "-o", "size=1m", "none", name]
+        if subprocess.run(disk, check=False, stderr=subprocess.DEVNULL).returncode:
             return "not tried: mount is not allowed here", True
         try:
             with system(record=f"{name}/full.mcap") as made:
-                made.client.until(
-                    lambda: any(status.log_fault for status in made.client.messages["status"][-1:]),
-                    "the end of the disk",
-                )
+                statuses = made.client.messages["status"]
+                made.client.until(lambda: any(status.log_fault for status in statuses[-1:]), "the end of the disk")
                 status = made.watch(3.0)[-1]
                 heard = made.hears("simulator", "No space left on device", 5.0)
                 good = made.flies() and heard and status.real_time_factor > PACE
                 made.parts["simulator"].interrupt()
-            shutil.copy(f"{name}/full.mcap", ROOT / "build" / "full.mcap")
+            shutil.copy(f"{name}/full.mcap", rest)
         finally:
             subprocess.run(["umount", name], check=True)
-    (ROOT / "build" / "full.recovered.mcap").unlink(missing_ok=True)
-    said = replayed(ROOT / "build" / "full.mcap", "--recover")
-    return f"flight goes on, status and diagnostics say {status.log_fault.rpartition(': ')[2]!r}; {said[:50]}", good
+        said = replayed(Path(rest) / "full.mcap", "--recover")
+    why = status.log_fault.rpartition(": ")[2]
+    return f"the flight goes on; status and diagnostics: {why!r}; log recovered ({said[:13]})", good
 
 
 def starved(share: float = 0.2) -> tuple[str, bool]:

@@ -497,7 +497,7 @@ def test_bad_values_from_a_function_of_time_are_refused(sbs, hover):
     def late(time):
         return hover.controls if time < 0.05 else hover.controls * math.nan
 
-    assert refusal(simulate, sbs, hover, late, 0.1).startswith("MR1 collective = nan: allowed are ")
+    assert refusal(simulate, sbs, hover, late, 0.1).startswith("collective = nan: allowed are -1.5708 to 1.5708 rad")
 
 
 @pytest.mark.parametrize("i", range(4), ids=CONTROL_NAMES)

@@ -8,6 +8,7 @@ import hashlib
 import itertools
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim import config_file
+from sbs_sim import checks, config_file
 from sbs_sim.aircraft_values import places, replaced, separate, value_at
 from sbs_sim.errors import AircraftError, AirfoilError
 from sbs_sim.model import params as P
@@ -28,7 +29,7 @@ Array = NDArray[np.float64]
 Range = tuple[float, float]
 NOT_PHYSICS = ("name", "airfoil", "collective_range", "cyclic_range", "swashplate_rate")  # of a rotor, for the model
 
-# what a schema calls its types, in words
+MOST_VALUES = 10_000  # of a file; aliases of aliases make billions of a few lines
 
 
 @dataclass(frozen=True)
@@ -196,6 +197,7 @@ class Aircraft:
         AircraftError
             One line that names the file and every wrong key with its value and what is allowed.
         """
+        checks.path("aircraft", path_or_name, AircraftError)
         path = _find(path_or_name, "aircraft", ".yaml", Path())
         try:
             return cls.from_dict(config_file.read_yaml(path), path.parent)
@@ -218,11 +220,12 @@ class Aircraft:
         AircraftError
             See `load`.
         """
-        return cls._made_of(data, folder or Path.cwd())
+        return cls._made_of(data, Path.cwd() if folder is None else checks.path("folder", folder, AircraftError))
 
     @classmethod
     def _made_of(cls, data: Any, folder: Path, similar: "Aircraft | None" = None) -> "Aircraft":
         """Checked aircraft of a mapping, with the airfoil tables of a similar one where they are the same."""
+        _check_size(data)
         _check_schema(data)
         data = separate(data)
         rotors = tuple(_rotor(entry) for entry in data["rotors"])
@@ -281,7 +284,7 @@ class Aircraft:
             return self._made_of(data, self.folder, self)
         except AircraftError as error:
             named = str(error).startswith(f"{path} = ")
-            raise AircraftError(f"{error}" if named else f"{path} = {config_file.short(value)}: {error}") from None
+            raise AircraftError(f"{error}" if named else f"{path} = {checks.shown(value)}: {error}") from None
 
     @cached_property
     def layout(self) -> StateLayout:
@@ -458,6 +461,34 @@ def _validator() -> Any:
     from jsonschema import Draft202012Validator  # here, because it is slow to import and needed once
 
     return Draft202012Validator(_schema())
+
+
+def _check_size(data: Any) -> None:
+    """Raise AircraftError for more values than any aircraft has, before anything goes through all of them."""
+    try:
+        size = _size(data, {})
+    except RecursionError:
+        raise AircraftError("the file is nested too deeply") from None
+    if size > MOST_VALUES:
+        raise AircraftError(
+            f"the file has {size} values, aliases counted as what they stand for: allowed are {MOST_VALUES}"
+        )
+
+
+def _size(node: Any, known: dict[int, int]) -> int:
+    """Number of values in nested mappings and lists; what contains itself counts once."""
+    if isinstance(node, Mapping):
+        parts = [*node.keys(), *node.values()]
+    elif isinstance(node, list | tuple | set | frozenset):
+        parts = list(node)
+    elif isinstance(node, complex | np.ndarray):  # the schema cannot even compare them
+        raise AircraftError(f"{checks.shown(node)}: allowed are numbers, texts, lists and mappings")
+    else:  # Python cannot even print a number of thousands of digits
+        return 1 + node.bit_length() if isinstance(node, int) else 1
+    if id(node) not in known:
+        known[id(node)] = 0
+        known[id(node)] = 1 + sum(_size(part, known) for part in parts)
+    return known[id(node)]
 
 
 def _check_schema(data: Any) -> None:

@@ -1,9 +1,11 @@
 """Single values of an aircraft file by path: "body.mass", "rotors.radius", "rotors[0].hub[2]", "rotors.MR1.radius"."""
 
+import numbers
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from sbs_sim import checks
 from sbs_sim.errors import AircraftError
 
 Place = tuple[str | int, ...]
@@ -46,8 +48,10 @@ def places(data: Mapping[str, Any], schema: Mapping[str, Any], path: str) -> lis
     AircraftError
         There is no such place: the message names the part of the path and what is allowed.
     """
-    if not PATH.fullmatch(path):
-        raise AircraftError(f"path = {path!r}: allowed are keys like body.mass, rotors.radius, rotors[0].hub[2]")
+    if not (isinstance(path, str) and path.isprintable() and PATH.fullmatch(path)):
+        raise AircraftError(
+            f"path = {checks.shown(path)}: allowed are keys like body.mass, rotors.radius, rotors[0].hub[2]"
+        )
     steps = [int(step["index"]) if step["index"] else step["key"] for step in STEP.finditer(path)]
     return _walk(data, schema, steps, "")
 
@@ -107,10 +111,14 @@ def replaced(data: Any, place: Place, value: Any) -> Any:
 
 
 def separate(data: Any) -> Any:
-    """Copy of nested mappings and lists that shares none of them, where YAML's anchors do."""
+    """Copy of nested mappings and lists that shares none of them, where YAML's anchors do; numbers are Python's own."""
     if isinstance(data, dict):
         return {key: separate(value) for key, value in data.items()}
-    return [separate(value) for value in data] if isinstance(data, list) else data
+    if isinstance(data, list):
+        return [separate(value) for value in data]
+    if isinstance(data, numbers.Number) and not isinstance(data, bool | int | float):
+        return int(data) if isinstance(data, numbers.Integral) else float(data)  # type: ignore[arg-type]
+    return data
 
 
 def unit_of(path: str) -> str:

@@ -4,8 +4,10 @@ import math
 from pathlib import Path
 from typing import Any
 
+from sbs_sim import checks
 from sbs_sim.errors import SbsError
 
+LARGEST_FILE = 1 << 18  # bytes; an aircraft with 16 rotors has 20 000
 TYPE_WORDS = {
     "number": "a number",
     "integer": "a whole number",
@@ -16,7 +18,7 @@ TYPE_WORDS = {
 
 
 class UnreadableError(SbsError):
-    """A file that is not YAML."""
+    """A file that is not YAML, or too large for a configuration."""
 
 
 def read_yaml(path: Path) -> Any:
@@ -30,7 +32,13 @@ def read_yaml(path: Path) -> Any:
     from ruamel.yaml import YAML  # here, because it is slow to import and needed once
 
     try:
-        return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            text = file.read(LARGEST_FILE + 1)
+        if len(text) > LARGEST_FILE:
+            raise UnreadableError(f"the file has more than {LARGEST_FILE} bytes")
+        return YAML(typ="safe", pure=True).load(text.decode("utf-8"))
+    except UnreadableError:
+        raise
     except Exception as error:  # the parser lets out all kinds: for "!!int x", a 31st of June, deep nesting
         raise UnreadableError("not readable as YAML: " + " ".join(str(error).split())) from None
 
@@ -88,14 +96,8 @@ def _explain(error: Any) -> str:
         "maxItems": f"a list of at most {limit}",
         "minLength": "a text that is not empty",
     }.get(rule, error.message)
-    return f"{path or 'file'} = {short(value)}: allowed is {allowed}"
+    return f"{path or 'file'} = {checks.shown(value)}: allowed is {allowed}"
 
 
 def _key(key: Any) -> str:
-    return key if isinstance(key, str) and key.isprintable() else short(key)
-
-
-def short(value: Any) -> str:
-    """Value in at most 60 characters."""
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return key if isinstance(key, str) and key.isprintable() else checks.shown(key)

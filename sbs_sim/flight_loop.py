@@ -19,12 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.model.wind import Wind
 from sbs_sim.simulation import Event, Simulation, Snapshot
 
 QUEUE_LENGTH = 100  # snapshots between the flight and their reader: one second at 100 Hz
+FAST_LENGTH = 2  # the same where the flight waits for its reader
 HURRY_TICKS = 10  # the schedule is kept by hurrying up to this many ticks; beyond, real time is lost for good
 READER_PATIENCE = 2.0  # s in which a reader takes a report, if there is one
 IDLE_PERIOD = 0.1  # s of wall time between reports while paused
@@ -91,9 +93,9 @@ class FlightLoop:
     def __init__(self, simulation: Simulation, real_time_factor: float = 1.0, command_timeout: float = 0.5) -> None:
         self._simulation = simulation
         self._wake = threading.Condition()
+        self.reports: queue.Queue[Report | None] = queue.Queue(QUEUE_LENGTH)
         self.set_pace(real_time_factor)
         self.set_command_timeout(command_timeout)
-        self.reports: queue.Queue[Report | None] = queue.Queue(QUEUE_LENGTH)
         self._mailbox: collections.deque[tuple[Callable[[], Any], Future[Any]]] = collections.deque()
         self._thread = threading.Thread(target=self._run, name="flight", daemon=True)
         self._playing = True
@@ -135,18 +137,17 @@ class FlightLoop:
 
     def set_pace(self, real_time_factor: float) -> None:
         """Set the wanted real-time factor, 0 to 1000."""
-        if not 0.0 <= real_time_factor <= 1000.0:
-            raise SimulationError(f"real_time_factor = {real_time_factor}: allowed are 0 to 1000")
+        pace = checks.number("real_time_factor", real_time_factor, 0.0, 1000.0, "", SimulationError)
+        # Where the flight waits for its reader, what waits to be read is how far a controller is behind.
+        self.reports.maxsize = FAST_LENGTH if pace == 0.0 else QUEUE_LENGTH
         with self._wake:
-            self._pace = real_time_factor
+            self._pace = pace
             self._replan = True
             self._wake.notify()
 
     def set_command_timeout(self, seconds: float) -> None:
         """Set the age at which a command counts as timed out [s]; 0 is never."""
-        if not 0.0 <= seconds <= 1e6:
-            raise SimulationError(f"command_timeout = {seconds}: allowed are 0 to 1e+06 s")
-        self._timeout = seconds
+        self._timeout = checks.number("command_timeout", seconds, 0.0, 1e6, "s", SimulationError)
 
     def command(self, swashplate: ArrayLike) -> None:
         """Set the swashplate angles of all rotors [rad], shape (n_rotors, 3), from the next tick on.
@@ -187,8 +188,7 @@ class FlightLoop:
 
     def step(self, ticks: int) -> float:
         """Fly some ticks while paused and return the simulation time [s] after them."""
-        if not 1 <= ticks <= MOST_STEP_TICKS:
-            raise SimulationError(f"ticks = {ticks}: allowed are 1 to {MOST_STEP_TICKS}")
+        ticks = checks.whole("ticks", ticks, 1, MOST_STEP_TICKS, SimulationError)
         for _ in range(ticks):
             time_after = self.call(self._single_tick)
         return float(time_after)

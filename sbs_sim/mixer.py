@@ -9,6 +9,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SimulationError
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
@@ -54,12 +55,10 @@ class Mixer:
         SimulationError
             Not four controls, or one that is not finite or beyond a right angle; the target before stays.
         """
-        values = np.asarray(controls, dtype=float)
+        values = checks.array("controls", controls, SimulationError)
         if values.shape != (len(CONTROL_NAMES),):
             raise SimulationError(f"controls have shape {values.shape}: allowed is ({len(CONTROL_NAMES)},)")
-        for name, value in zip(CONTROL_NAMES, values, strict=True):
-            if not abs(value) <= math.pi / 2:  # true for a NaN as well
-                raise SimulationError(f"{name} = {value}: allowed are -1.5708 to 1.5708 rad")
+        check_controls(values)
         clipped = np.clip(values, self._low, self._high)
         wanted = self.aircraft.mix(clipped)
         self._target = np.clip(wanted, self._swash_low, self._swash_high)
@@ -115,6 +114,13 @@ class Mixer:
         if self._target is None:
             return True
         return self._angles is not None and np.array_equal(self._angles, self._target)
+
+
+def check_controls(values: Array) -> None:
+    """Raise SimulationError for pilot controls [rad], shape (4,), that are not finite or beyond a right angle."""
+    if not np.abs(values).max() <= math.pi / 2:  # true for a NaN as well
+        for name, value in zip(CONTROL_NAMES, values, strict=True):
+            checks.number(name, value, -math.pi / 2, math.pi / 2, "rad", SimulationError)
 
 
 def _clipped(names: tuple[str, ...] | list[str], wanted: Array, limited: Array) -> list[str]:

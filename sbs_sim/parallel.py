@@ -8,6 +8,7 @@ from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol
 
+from sbs_sim import checks
 from sbs_sim.errors import ClusterError, SbsError
 
 if TYPE_CHECKING:
@@ -111,10 +112,8 @@ def checked_workers(workers: int | None, dask: object, error: type[SbsError]) ->
     if workers is None:
         return len(os.sched_getaffinity(0))
     if dask is not None:
-        raise error(f"workers = {workers!r}: not allowed with dask, whose workers are those of the cluster")
-    if isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= MOST_WORKERS:
-        raise error(f"workers = {workers!r}: allowed are whole numbers from 1 to {MOST_WORKERS}")
-    return workers
+        raise error(f"workers = {checks.shown(workers)}: not allowed with dask, whose workers are those of the cluster")
+    return checks.whole("workers", workers, 1, MOST_WORKERS, error)
 
 
 def _pool(workers: int, dask: "str | distributed.Client | None") -> AbstractContextManager[Pool]:

@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint
 from sbs_sim.errors import SimulationError
+from sbs_sim.mixer import check_controls
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.dynamics import derivative
@@ -32,6 +34,8 @@ Commands = ArrayLike | Callable[[float], ArrayLike]
 
 UNIT = 1e-9  # a quaternion whose norm is this near to one is a unit quaternion
 METHODS = {"rk4": RK4, "tsit5": TSIT5, "partitioned": PARTITIONED}
+TICKS = (1e-4, 1.0)  # s, shortest and longest
+AZIMUTH_STEPS = (math.radians(0.01), math.radians(45.0))  # rad
 
 # A tick is one uninterrupted call of compiled code; this many steps take it a tenth of a second.
 MOST_STEPS_PER_TICK = 10_000
@@ -168,12 +172,12 @@ class Simulation:
         method: str = "rk4",
         wind: Wind | None = None,
     ) -> None:
-        if not 1e-4 <= tick <= 1.0:
-            raise SimulationError(f"tick = {tick}: allowed are 0.0001 to 1 s")
-        if not math.radians(0.01) <= azimuth_step <= math.radians(45.0):
-            raise SimulationError(f"azimuth_step = {math.degrees(azimuth_step):g} deg: allowed are 0.01 to 45 deg")
-        if method not in METHODS:
-            raise SimulationError(f"method = {method!r}: allowed are {', '.join(METHODS)}")
+        checks.instance("aircraft", aircraft, Aircraft, SimulationError)
+        tick = checks.number("tick", tick, *TICKS, "s", SimulationError)
+        azimuth_step = checks.number("azimuth_step", azimuth_step, *AZIMUTH_STEPS, "rad", SimulationError)
+        lead_lag = checks.flag("lead_lag", lead_lag, SimulationError)
+        cyclic_inflow = checks.flag("cyclic_inflow", cyclic_inflow, SimulationError)
+        checks.choice("method", method, tuple(METHODS), SimulationError)
         self.options: dict[str, Any] = {
             "tick": tick,
             "azimuth_step": azimuth_step,
@@ -201,8 +205,7 @@ class Simulation:
         self._azimuth0 = np.zeros(len(aircraft.rotors))
         self._slope = np.zeros(self.layout.size)
         self.step = 0
-        self._field = WindField(wind or Wind(), 0.0, tick)
-        self._air = self._field.next_tick()
+        self.set_wind(Wind() if wind is None else wind)
         self.state = self.checked_state(state)
         self.swashplate = self.checked_swashplate(swashplate)
 
@@ -245,7 +248,7 @@ class Simulation:
         SimulationError
             Naming the state, its value and what is allowed.
         """
-        values = np.array(state, dtype=float).ravel()
+        values = checks.array("state", state, SimulationError).ravel()
         if len(values) != self.layout.size:
             raise SimulationError(f"state has {len(values)} values: allowed are {self.layout.size}")
         for name, value, bound in zip(self.layout.names, values, self._bounds, strict=True):
@@ -268,7 +271,7 @@ class Simulation:
         SimulationError
             Naming rotor, angle, value and range.
         """
-        values = np.array(angles, dtype=float)
+        values = checks.array("swashplate", angles, SimulationError)
         rotors = self.aircraft.rotors
         if values.shape != (len(rotors), 3):
             if values.ndim == 2 and values.shape[1] == 3:
@@ -288,6 +291,7 @@ class Simulation:
 
     def set_wind(self, wind: Wind) -> None:
         """Set the wind from the next tick on; gust delays count from now."""
+        checks.instance("wind", wind, Wind, SimulationError)
         self._field = WindField(wind, self.time, self.tick)
         self._air = self._field.next_tick()
 
@@ -528,8 +532,7 @@ def trimmed_state(
     SimulationError
         The heading is not finite or far from a turn; position and velocity are checked by `Simulation`.
     """
-    if not abs(heading) <= 4 * math.pi:  # true for a NaN as well
-        raise SimulationError(f"heading = {heading}: allowed are {-4 * math.pi:.6g} to {4 * math.pi:.6g} rad")
+    heading = checks.number("heading", heading, -4 * math.pi, 4 * math.pi, "rad", SimulationError)
     state = aircraft.layout.from_linear(point.state, heading)
     state[: S.ATTITUDE] = position
     to_earth = rotation_matrix(euler_to_quaternion(heading, point.pitch, point.roll))
@@ -586,14 +589,18 @@ def simulate(
     SimulationError
         See `Simulation`.
     """
-    options: dict[str, Any] = {
-        "tick": tick,
-        "azimuth_step": azimuth_step,
-        "lead_lag": lead_lag,
-        "cyclic_inflow": cyclic_inflow,
-        "method": method,
-    }
-    histories, fault = fly_commands(aircraft, start, controls, duration, wind=wind, **options)
+    histories, fault = fly_commands(
+        aircraft,
+        start,
+        controls,
+        duration,
+        wind=wind,
+        tick=tick,
+        azimuth_step=azimuth_step,
+        lead_lag=lead_lag,
+        cyclic_inflow=cyclic_inflow,
+        method=method,
+    )
     if fault is not None:
         raise fault
     return histories
@@ -635,9 +642,10 @@ def fly_commands(
     SimulationError
         The flight cannot begin.
     """
-    if not 0.0 <= duration <= 1e6:
-        raise SimulationError(f"duration = {duration}: allowed are 0 to 1e+06 s")
-    air = wind or Wind()
+    checks.instance("aircraft", aircraft, Aircraft, SimulationError)
+    duration = checks.number("duration", duration, 0.0, 1e6, "s", SimulationError)
+    air = Wind() if wind is None else wind
+    checks.instance("wind", air, Wind, SimulationError)
     state = trimmed_state(aircraft, start, wind=air.velocity) if isinstance(start, TrimPoint) else start
     command = _command(controls)
     simulation = Simulation(aircraft, state, aircraft.mix(command(0, 0.0)), wind=air, **options)
@@ -666,13 +674,13 @@ def _angles(
     angles: list[Array] = []
     wrong: SimulationError | None = None
     for i in range(begin, end):
-        controls = command(i, i * simulation.steps_per_tick * simulation.step_size)
-        if not given or controls.tobytes() != given[-1].tobytes():
-            try:
+        try:
+            controls = command(i, i * simulation.steps_per_tick * simulation.step_size)
+            if not given or controls.tobytes() != given[-1].tobytes():
                 checked = simulation.checked_swashplate(simulation.aircraft.mix(controls))
-            except SimulationError as error:
-                wrong = error
-                break
+        except SimulationError as error:
+            wrong = error
+            break
         given.append(controls)
         angles.append(checked)
     return np.array(given), np.array(angles), wrong
@@ -687,16 +695,19 @@ def _command(controls: Commands) -> Callable[[int, float], Array]:
             return _four(function(time))
 
         return by_time
-    rows = np.atleast_2d(np.asarray(controls, dtype=float))
+    rows = np.atleast_2d(checks.array("controls", controls, SimulationError))
     if rows.ndim != 2 or rows.shape[1] != len(S.CONTROL_NAMES) or len(rows) == 0:
         raise SimulationError(f"controls have shape {np.shape(controls)}: allowed are (4,) and (n, 4)")
+    for row in rows:
+        check_controls(row)
     return lambda i, _: rows[min(i, len(rows) - 1)]
 
 
 def _four(values: ArrayLike) -> Array:
-    array = np.asarray(values, dtype=float)
+    array = checks.array("controls", values, SimulationError)
     if array.shape != (len(S.CONTROL_NAMES),):
         raise SimulationError(f"controls have shape {array.shape}: allowed is (4,)")
+    check_controls(array)
     return array
 
 

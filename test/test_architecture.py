@@ -66,11 +66,18 @@ def test_only_nodes_import_ros(name):
 
 ALLOWED = {
     "sbs_sim.errors": [],
-    "sbs_sim.model": ["sbs_sim.model", "sbs_sim.errors"],
-    "sbs_sim.aircraft_values": ["sbs_sim.errors"],
-    "sbs_sim.config_file": ["sbs_sim.errors"],
-    "sbs_sim.aircraft": ["sbs_sim.aircraft_values", "sbs_sim.config_file", "sbs_sim.model", "sbs_sim.errors"],
-    "sbs_sim.mixer": ["sbs_sim.aircraft", "sbs_sim.model", "sbs_sim.errors"],
+    "sbs_sim.checks": ["sbs_sim.errors"],
+    "sbs_sim.model": ["sbs_sim.model", "sbs_sim.checks", "sbs_sim.errors"],
+    "sbs_sim.aircraft_values": ["sbs_sim.checks", "sbs_sim.errors"],
+    "sbs_sim.config_file": ["sbs_sim.checks", "sbs_sim.errors"],
+    "sbs_sim.aircraft": [
+        "sbs_sim.aircraft_values",
+        "sbs_sim.checks",
+        "sbs_sim.config_file",
+        "sbs_sim.model",
+        "sbs_sim.errors",
+    ],
+    "sbs_sim.mixer": ["sbs_sim.aircraft", "sbs_sim.model", "sbs_sim.checks", "sbs_sim.errors"],
 }
 FORBIDDEN = {
     "sbs_sim.analysis": ["sbs_sim.nodes", "sbs_sim.recording", "sbs_sim.flight_loop"],

@@ -199,7 +199,7 @@ def test_sweep_takes_degrees_and_tells_failures(sbs):
     assert text.startswith("sideslip [deg]  pitch [deg]")
     assert row(text[text.index("\n") + 1 :], "           -90")[1] == pytest.approx(math.degrees(point.roll), abs=1e-3)
     assert "no trim, see below" in text
-    assert "sideslip 200: sideslip = 3.49065" in text
+    assert "sideslip 200: sideslip_deg = 200.0: allowed are -180 to 180 deg\n" in text
 
 
 def test_a_sweep_without_any_trim_fails():
@@ -241,6 +241,13 @@ FAILURES = {
     "bad value": (("linearize", "--set", "body.mass=heavy"), "body.mass = 'heavy': allowed is a number"),
     "not finite": (("trim", "--set", "body.mass=NaN"), "body.mass = nan: allowed is a finite number"),
     "no number": (("trim", "--airspeed", "nan"), "airspeed = nan: allowed are -100 to 100 m/s"),
+    "infinite": (("trim", "--airspeed", "-inf"), "airspeed = -inf: allowed are -100 to 100 m/s"),
+    "an exponent": (("trim", "--climb-rate", "-6e1"), "climb_rate = -60.0: allowed are -50 to 50 m/s"),
+    "degrees": (("trim", "--sideslip-deg", "200"), "sideslip_deg = 200.0: allowed are -180 to 180 deg"),
+    "degrees by time": (
+        ("trim", "--turn-rate-deg", "-2e2"),
+        "turn_rate_deg = -200.0: allowed are -171.887 to 171.887 deg/s",
+    ),
     "no trim": (("linearize", "--airspeed", "90"), "no trim after "),
     "azimuths": (("trim", "--azimuth-count", "0"), "azimuth_count = 0: allowed are whole numbers from 1 to 1000"),
     "unknown parameter": (("sweep", "body.mas", "1", "2", "2"), "parameter 'body.mas': allowed are airspeed, "),

@@ -15,6 +15,8 @@ rclpy = pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import Point, Vector3  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
+from rcl_interfaces.srv import SetParametersAtomically  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
 from ros_harness import DOMAINS, EXECUTABLES, controls_message, environment, swashplate_message, world  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
@@ -247,8 +249,8 @@ def test_wind_moves_the_aircraft_and_a_gust_passes(client):
         ),
         ("set_wind", SetWind, {"gust_duration": -1.0}, "gust_duration = -1.0"),
         ("set_wind", SetWind, {"turbulence_intensity": Vector3(z=-1.0)}, "turbulence_intensity.z = -1.0"),
-        ("step", Step, {"ticks": 1001}, "ticks = 1001: allowed are 1 to 1000"),
-        ("step", Step, {"ticks": 4294967295}, "ticks = 4294967295: allowed are 1 to"),
+        ("step", Step, {"ticks": 1001}, "ticks = 1001: allowed are whole numbers from 1 to 1000"),
+        ("step", Step, {"ticks": 4294967295}, "ticks = 4294967295: allowed are whole numbers from 1 to"),
     ],
 )
 def test_bad_requests_are_refused_and_change_nothing(client, name, kind, request_fields, said):
@@ -281,6 +283,19 @@ def test_bad_commands_are_refused_and_change_nothing(client, topic, message, nod
     client.publish(topic, message)
     client.next("diagnostics", lambda m: (rejected(m) or 0) > before)
     np.testing.assert_allclose(vector(client.next("state").velocity), 0.0, atol=1e-3)
+
+
+def test_parameters_are_set_together_or_not_at_all(client):
+    request = [Parameter("real_time_factor", value=0.2), Parameter("command_timeout", value=math.nan)]
+    answer = client.call(
+        SetParametersAtomically,
+        "simulator/set_parameters_atomically",
+        parameters=[parameter.to_parameter_msg() for parameter in request],
+    )
+    assert not answer.result.successful
+    assert answer.result.reason == "Parameter command_timeout out of range Min: 0.0, Max: 1000000.0, value: nan"
+    client.spin(1.5)
+    assert client.next("status").real_time_factor > 0.5  # and not the 0.2 that came along
 
 
 def test_an_old_command_is_held_and_reported(flight, client, hover):

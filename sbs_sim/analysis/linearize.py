@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import export
 from sbs_sim.analysis.modes import Mode, modes
@@ -244,10 +245,9 @@ def linearize(
     LinearizationError
         A value out of range, or a trim of another aircraft.
     """
-    if method not in METHODS:
-        raise LinearizationError(f"method = {method!r}: allowed are {', '.join(METHODS)}")
-    if not STEP_SCALES[0] <= step_scale <= STEP_SCALES[1]:
-        raise LinearizationError(f"step_scale = {step_scale}: allowed are {STEP_SCALES[0]:g} to {STEP_SCALES[1]:g}")
+    checks.instance("aircraft", aircraft, Aircraft, LinearizationError)
+    checks.choice("method", method, METHODS, LinearizationError)
+    step_scale = checks.number("step_scale", step_scale, *STEP_SCALES, "", LinearizationError)
     if point is None:
         point = trim(
             aircraft,
@@ -259,7 +259,8 @@ def linearize(
             cyclic_inflow=cyclic_inflow,
             azimuth_count=azimuth_count,
         )
-    elif point.parameter_hash != aircraft.parameter_hash:
+    checks.instance("point", point, TrimPoint, LinearizationError)
+    if point.parameter_hash != aircraft.parameter_hash:
         raise LinearizationError("point: allowed is a trim of this aircraft, it is one of another")
     model = _averaged(aircraft, point, step_scale)
     if method == "averaged":

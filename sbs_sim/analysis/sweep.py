@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft_values import unit_of
 from sbs_sim.analysis.export import model_to_dict, trim_to_dict
@@ -238,7 +239,9 @@ def sweep(
     ClusterError
         A cluster that cannot be reached, or that would not give the same.
     """
+    checks.instance("aircraft", aircraft, Aircraft, SweepError)
     numbers = _checked_values(values)
+    linear = checks.flag("linear", linear, SweepError)
     _check_parameter(aircraft, parameter)
     condition = {"airspeed": airspeed, "climb_rate": climb_rate, "sideslip": sideslip, "turn_rate": turn_rate}
     fidelity = {"lead_lag": lead_lag, "cyclic_inflow": cyclic_inflow, "azimuth_count": azimuth_count}
@@ -257,10 +260,7 @@ def sweep(
 
 
 def _checked_values(values: ArrayLike) -> list[float]:
-    try:
-        numbers = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise SweepError(f"values = {values!r}: allowed is a list of numbers") from None
+    numbers = checks.array("values", values, SweepError)
     if numbers.ndim != 1 or numbers.size == 0:
         raise SweepError(f"values have the shape {numbers.shape}: allowed is a list of at least one number")
     if not np.isfinite(numbers).all():
@@ -270,6 +270,7 @@ def _checked_values(values: ArrayLike) -> list[float]:
 
 
 def _check_parameter(aircraft: Aircraft, parameter: str) -> None:
+    checks.instance("parameter", parameter, str, SweepError)
     if parameter in CONDITIONS:
         return
     try:

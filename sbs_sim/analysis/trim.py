@@ -7,6 +7,7 @@ nested loops are there to compare with.
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.newton import newton
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimPoint, TrimProblem
@@ -57,22 +58,18 @@ def trim(
     TrimError
         A value out of range, or no solution: message and attributes hold the last residual and its worst equation.
     """
+    checks.instance("aircraft", aircraft, Aircraft, TrimError)
     condition = TrimCondition(airspeed, climb_rate, sideslip, turn_rate)
-    _check_azimuth_count(azimuth_count)
-    if method not in METHODS:
-        raise TrimError(f"method = {method!r}: allowed are {', '.join(METHODS)}")
+    lead_lag = checks.flag("lead_lag", lead_lag, TrimError)
+    cyclic_inflow = checks.flag("cyclic_inflow", cyclic_inflow, TrimError)
+    azimuth_count = checks.whole("azimuth_count", azimuth_count, 1, LARGEST_AZIMUTH_COUNT, TrimError)
+    checks.choice("method", method, METHODS, TrimError)
     problem = TrimProblem(aircraft, lead_lag, cyclic_inflow, azimuth_count)
     if method == "two_loop":
         unknowns, outer, inner = solve_by_two_loops(problem, condition, problem.first_guess(IDLE_LOADINGS[0]))
         return problem.point(condition, unknowns, method, outer, inner)
     unknowns, iterations = _follow_path(problem, condition)
     return problem.point(condition, unknowns, method, iterations)
-
-
-def _check_azimuth_count(value: object) -> None:
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not (whole and 1 <= value <= LARGEST_AZIMUTH_COUNT):  # type: ignore[operator]
-        raise TrimError(f"azimuth_count = {value}: allowed are whole numbers from 1 to {LARGEST_AZIMUTH_COUNT}")
 
 
 def _follow_path(problem: TrimProblem, condition: TrimCondition) -> tuple[Array, int]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.export import trim_to_dict
 from sbs_sim.errors import TrimError
@@ -24,6 +25,13 @@ Array = NDArray[np.float64]
 
 ATTITUDE_UNKNOWNS, CONTROL_UNKNOWNS = 2, 4
 BODY_UNKNOWNS = ATTITUDE_UNKNOWNS + CONTROL_UNKNOWNS
+# Largest magnitude of each value of a condition, and its unit.
+LIMITS = {
+    "airspeed": (100.0, "m/s"),
+    "climb_rate": (50.0, "m/s"),
+    "sideslip": (math.pi, "rad"),
+    "turn_rate": (3.0, "rad/s"),
+}
 BODY_STEP, ROTOR_STEP = 1e-5, 1e-6  # of the differences: m/s, rad/s, rad; rad, inflow ratio
 JACOBIAN_AZIMUTHS = 4  # enough to say where to go, the residual says where to stop
 MOTION = [S.LINEAR_U, S.LINEAR_V, S.LINEAR_W, S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]
@@ -57,12 +65,9 @@ class TrimCondition:
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        limits = {"airspeed": (100.0, "m/s"), "climb_rate": (50.0, "m/s")}
-        limits |= {"sideslip": (math.pi, "rad"), "turn_rate": (3.0, "rad/s")}
-        for name, (most, unit) in limits.items():
-            value = getattr(self, name)
-            if not abs(value) <= most:  # true for a NaN as well
-                raise TrimError(f"{name} = {value}: allowed are {-most:g} to {most:g} {unit}")
+        for name, (most, unit) in LIMITS.items():
+            value = checks.number(name, getattr(self, name), -most, most, unit, TrimError)
+            object.__setattr__(self, name, value)
 
     def scaled(self, share: float) -> "TrimCondition":
         """Condition on the way from hover (0) to this one (1)."""

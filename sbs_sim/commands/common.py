@@ -8,6 +8,7 @@ import io
 import json
 import math
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 DEGREES = 180.0 / math.pi
 INTERRUPTED = 130
+# What may follow an option without being one itself; argparse of Python up to 3.13 knows no exponents.
+NEGATIVE_NUMBER = re.compile(r"-((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|inf|infinity|nan)", re.IGNORECASE)
 
 
 class UsageError(Exception):
@@ -36,6 +39,7 @@ def execute(
     Errors of this package are one line on stderr and the code 1; a wrong command line is argparse's and 2.
     """
     _behave_on_a_terminal()
+    parser._negative_number_matcher = NEGATIVE_NUMBER
     # intermixed: options may stand between the arguments
     parsed = parser.parse_intermixed_args(arguments)
     try:
@@ -139,16 +143,40 @@ def aircraft(arguments: argparse.Namespace) -> "Aircraft":
 
 
 def flight(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Arguments for `sbs_sim.trim`: condition and fidelity, in SI units and radians."""
+    """Arguments for `sbs_sim.trim`: condition and fidelity, in SI units and radians.
+
+    Raises
+    ------
+    TrimError
+        An angle out of range, in degrees as it was typed.
+    """
     return {
         "airspeed": arguments.airspeed,
         "climb_rate": arguments.climb_rate,
-        "sideslip": math.radians(arguments.sideslip_deg),
-        "turn_rate": math.radians(arguments.turn_rate_deg),
+        "sideslip": radians("sideslip", arguments.sideslip_deg),
+        "turn_rate": radians("turn_rate", arguments.turn_rate_deg),
         "lead_lag": arguments.lead_lag,
         "cyclic_inflow": arguments.cyclic_inflow,
         "azimuth_count": arguments.azimuth_count,
     }
+
+
+def radians(name: str, degrees: float) -> float:
+    """An angle of a flight condition that was typed in degrees, or its rate.
+
+    Raises
+    ------
+    TrimError
+        It is out of range.
+    """
+    from sbs_sim import checks
+    from sbs_sim.analysis.trim_problem import LIMITS
+    from sbs_sim.errors import TrimError
+
+    most, unit = LIMITS[name]
+    limit = math.degrees(most)
+    checks.number(f"{name}_deg", degrees, -limit, limit, unit.replace("rad", "deg"), TrimError)
+    return max(-most, min(most, math.radians(degrees)))  # the limit itself may round to beyond it
 
 
 @contextmanager

@@ -15,8 +15,9 @@ from sbs_sim.commands.common import (
     flight,
     print_table,
     progress_bar,
+    radians,
 )
-from sbs_sim.errors import SweepError
+from sbs_sim.errors import SbsError, SweepError
 
 if TYPE_CHECKING:
     from sbs_sim.analysis.sweep import Sweep, SweepPoint
@@ -134,9 +135,19 @@ def _print_sweep(found: "Sweep") -> None:
     print_table([*headings, "power [W]", "growing modes"], rows, left=(8,))
     for value, point in zip(shown, found.points, strict=True):
         if point.error is not None:
-            print(f"{found.parameter} {value:g}: {point.error}")
+            print(f"{found.parameter} {value:g}: {_error(found, value, point)}")
         elif point.trim is not None and point.trim.beyond_limits:
             print(f"{found.parameter} {value:g}: beyond its limits: {'; '.join(point.trim.beyond_limits)}")
+
+
+def _error(found: "Sweep", shown: float, point: "SweepPoint") -> str:
+    """What is wrong with a point; with an angle that was typed in degrees, in degrees."""
+    try:
+        if f"{found.parameter}_deg" in TYPED:
+            radians(found.parameter, shown)
+    except SbsError as error:
+        return str(error)
+    return point.error or ""
 
 
 def _growing(point: "SweepPoint") -> str:

@@ -5,11 +5,13 @@ linear between the tick's ends.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim import checks
 from sbs_sim.errors import SimulationError
 from sbs_sim.model.kernel import exact_entry, kernel
 
@@ -19,6 +21,13 @@ Array = NDArray[np.float64]
 STEADY, GUST, GUST_START, GUST_DURATION, TURBULENCE_FROM, TURBULENCE_TO = 0, 3, 6, 7, 8, 11
 WIND_SIZE = 14
 LARGEST_WIND = 100.0  # m/s; the strongest wind measured at the ground is 113 m/s
+RANGES = {
+    "gust_delay": (0.0, 1e6, "s"),
+    "gust_duration": (0.0, 1e6, "s"),
+    "turbulence_length": (0.1, 1e4, "m"),
+    "turbulence_airspeed": (0.1, LARGEST_WIND, "m/s"),
+    "turbulence_direction": (-10.0, 10.0, "rad"),
+}
 
 
 @kernel
@@ -82,23 +91,14 @@ class Wind:
         for name in ("velocity", "gust", "turbulence_intensity"):
             least = 0.0 if name == "turbulence_intensity" else -LARGEST_WIND
             values = getattr(self, name)
-            if np.shape(values) != (3,):
-                raise SimulationError(f"{name} = {values}: allowed are 3 values, north, east, down [m/s]")
+            if not isinstance(values, Sequence | np.ndarray) or len(values) != 3:
+                allowed = "allowed are 3 values, north, east, down [m/s]"
+                raise SimulationError(f"{name} = {checks.shown(values)}: {allowed}")
             for axis, value in zip("xyz", values, strict=True):
-                _check(f"{name}.{axis}", value, least, LARGEST_WIND, "m/s")
-        _check("gust_delay", self.gust_delay, 0.0, 1e6, "s")
-        _check("gust_duration", self.gust_duration, 0.0, 1e6, "s")
-        _check("turbulence_length", self.turbulence_length, 0.1, 1e4, "m")
-        _check("turbulence_airspeed", self.turbulence_airspeed, 0.1, LARGEST_WIND, "m/s")
-        _check("turbulence_direction", self.turbulence_direction, -10.0, 10.0, "rad")
-        seed = self.turbulence_seed
-        if not (isinstance(seed, (int, np.integer)) and 0 <= seed < 2**64):
-            raise SimulationError(f"turbulence_seed = {seed}: allowed are whole numbers from 0 to 2^64 - 1")
-
-
-def _check(name: str, value: float, least: float, most: float, unit: str) -> None:
-    if not least <= value <= most:  # false for a NaN as well
-        raise SimulationError(f"{name} = {value}: allowed are {least:g} to {most:g} {unit}")
+                checks.number(f"{name}.{axis}", value, least, LARGEST_WIND, "m/s", SimulationError)
+        for name, (least, most, unit) in RANGES.items():
+            checks.number(name, getattr(self, name), least, most, unit, SimulationError)
+        checks.whole("turbulence_seed", self.turbulence_seed, 0, 2**64 - 1, SimulationError)
 
 
 class WindField:

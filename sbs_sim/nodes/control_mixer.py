@@ -18,6 +18,7 @@ from sbs_sim.errors import SbsError
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.mixer import Mixer
 from sbs_sim.model.state import SWASHPLATE_NAMES
+from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, swashplate_messages, to_time
 from sbs_sim.nodes.host import (
     COMMAND_QOS,
@@ -25,11 +26,9 @@ from sbs_sim.nodes.host import (
     EVENT_QOS,
     HEALTH_PERIOD,
     STATE_QOS,
-    Accepted,
     Component,
     Log,
     Parameter,
-    Refusals,
     Topic,
     declare,
     diagnostic,
@@ -63,11 +62,10 @@ class ControlMixer(Component):
         self._mixer = Mixer(Aircraft.load(declare(self, PARAMETERS)["aircraft"]) if loop is None else loop.aircraft)
         self._resets = 0
         self._moved_at = -1.0
-        self._refusals = Refusals(self, "controls")
         self._last_seen: dict[str, float] = {}
         self._output = self.create_publisher(SwashplateArray, "swashplate", COMMAND_QOS)
         self._health = Topic(self, DiagnosticArray, "diagnostics", STATE_QOS, log)
-        self._accepted = Accepted(self, Controls, "controls", COMMAND_QOS, log)
+        self._arrivals = Arrivals(self, Controls, "controls", COMMAND_QOS, log)
         self.create_subscription(Controls, "controls", self._on_controls, COMMAND_QOS)
         if loop is None:
             self.create_subscription(FlightEvent, "events", self._on_event, EVENT_QOS)
@@ -90,6 +88,7 @@ class ControlMixer(Component):
     def _on_event(self, message: FlightEvent) -> None:
         """What was commanded before the aircraft was put somewhere is void."""
         if message.kind in (FlightEvent.START, FlightEvent.RESET):
+            self._arrivals.restart()
             angles = np.array(message.swashplate).reshape(-1, len(SWASHPLATE_NAMES))
             self._mixer.forget()
             if len(angles) == len(self._mixer.aircraft.rotors):  # else it is another aircraft's
@@ -98,13 +97,14 @@ class ControlMixer(Component):
     def _on_controls(self, message: Controls) -> None:
         self._follow_resets()
         try:
+            self._arrivals.check_order(message)
             self._mixer.set_target(controls_array(message))
             if self._loop is not None and self._mixer.rests:
                 self._mixer.stand(self._loop.swashplate())
         except SbsError as error:
-            self._refusals.add(error)
+            self._arrivals.add(error)
             return
-        self._accepted.keep(message, self._now())
+        self._arrivals.accept(message, self._now())
         self._move()
 
     def _go_on(self) -> None:
@@ -140,7 +140,10 @@ class ControlMixer(Component):
 
     def _publish_health(self) -> None:
         problems = [(DiagnosticStatus.WARN, f"clipped: {text}") for text in self._mixer.saturated]
-        values = {"rate_limited": not self._mixer.arrived, **self._refusals.values()}
+        problems += self._arrivals.problems()
+        if self._loop is None and not self.count_publishers("/clock"):
+            problems.append((DiagnosticStatus.WARN, "no simulator: nobody publishes /clock"))
+        values = {"rate_limited": not self._mixer.arrived, **self._arrivals.values()}
         message = DiagnosticArray(status=[diagnostic("control_mixer", problems, values)])
         message.header.stamp = to_time(self._now())
         self._health.publish(message, self._now())

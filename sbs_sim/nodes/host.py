@@ -14,17 +14,21 @@ import rclpy
 import rclpy.utilities
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as ROSParameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 
+from sbs_sim.aircraft import config_folder
 from sbs_sim.errors import SbsError
 
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+# What ROS raises where a name, a parameter or a setting of the environment makes a node impossible.
+ROS_REFUSALS = (rclpy_implementation.RCLError, NameValidationException, ParameterException)
 HEALTH_PERIOD = 1.0  # s of wall time between diagnostics
 COMPLAINT_PERIOD = 1.0  # s between complaints about bad input
 STOP_PERIOD = 0.2  # s, longest time that a thread takes to see the end
@@ -92,19 +96,6 @@ class Topic:
         self._publisher.publish(data)
         if self._log is not None:
             self._log.write(self._channel, time, data, wait, essential)
-
-
-class Accepted:
-    """A topic that is listened to: what is accepted of it goes into the log."""
-
-    def __init__(self, node: Node, kind: Any, name: str, qos: QoSProfile, log: Log | None = None) -> None:
-        self._log = log
-        self._channel = log.channel(node.resolve_topic_name(name), kind, qos) if log else 0
-
-    def keep(self, message: Any, time: float) -> None:
-        """Record a message that was accepted at a simulation time [s]."""
-        if self._log is not None:
-            self._log.write(self._channel, time, serialize_message(message))
 
 
 class Component(Node):
@@ -252,10 +243,15 @@ def run(
         0 after an interruption (Ctrl-C, SIGTERM) or the end, 1 if the nodes could not start.
     """
     stop = end or threading.Event()
-    leftover = rclpy.utilities.remove_ros_args(args)[1:]
+    try:
+        leftover = own_arguments(args)
+    except SbsError as error:
+        print(error, file=sys.stderr)
+        return 2
     if leftover:
         print(f"unknown argument {leftover[0]}: parameters are given as --ros-args -p name:=value", file=sys.stderr)
         return 2
+    _keep_to_this_machine()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
@@ -271,7 +267,7 @@ def run(
         for thread in threads:
             thread.start()
         stop.wait()
-    except SbsError as error:
+    except (SbsError, *ROS_REFUSALS) as error:
         print(_one_line(error), file=sys.stderr)
         return 1
     finally:
@@ -291,6 +287,27 @@ def run(
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)  # a second one must not tear the end of the interpreter apart
     return 0
+
+
+def own_arguments(args: list[str] | None) -> list[str]:
+    """Arguments of a command line that are not for ROS.
+
+    Raises
+    ------
+    SbsError
+        Those for ROS are wrong.
+    """
+    try:
+        return list(rclpy.utilities.remove_ros_args(args)[1:])
+    except rclpy_implementation.RCLError as error:
+        raise SbsError(f"wrong --ros-args: {_one_line(error)}") from None
+
+
+def _keep_to_this_machine() -> None:
+    """Have DDS open no port to the network where discovery is for this machine only; that alone does not see to it."""
+    profiles = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
+    if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST" and not any(map(os.environ.get, profiles)):
+        os.environ[profiles[0]] = str(config_folder() / "loopback.xml")
 
 
 def _spin(node: Node, stop: threading.Event) -> None:

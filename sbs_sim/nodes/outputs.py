@@ -12,8 +12,9 @@ from rosgraph_msgs.msg import Clock
 
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray, SimulationStatus
 from sbs_sim.flight_loop import FlightLoop, Report
+from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
-from sbs_sim.nodes.host import EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Refusals, Topic, diagnostic
+from sbs_sim.nodes.host import EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Topic, diagnostic
 
 PUBLISHING_TIME = 10.0  # s for what is still to be published at the end
 
@@ -29,14 +30,14 @@ class Outputs:
     node : Node
         Owner of the publishers.
     loop : FlightLoop
-    refusals : Refusals
-        Commands that the simulator has refused.
+    arrivals : Arrivals
+        The commands of the simulator.
     log : Recorder, optional
         Where everything that is published is recorded.
     """
 
-    def __init__(self, node: Node, loop: FlightLoop, refusals: Refusals, log: "Recorder | None" = None) -> None:
-        self._node, self._loop, self._refusals, self._log = node, loop, refusals, log
+    def __init__(self, node: Node, loop: FlightLoop, arrivals: Arrivals, log: "Recorder | None" = None) -> None:
+        self._node, self._loop, self._arrivals, self._log = node, loop, arrivals, log
         self._log_fault_said = False
         self._messages = StateMessages(loop.aircraft)
         self._clock_message, self._status = Clock(), SimulationStatus()
@@ -87,7 +88,7 @@ class Outputs:
         status.missed_deadlines = report.missed_deadlines
         status.steps = report.step
         status.dropped_messages = report.dropped
-        status.rejected_messages = self._refusals.count
+        status.rejected_messages = self._arrivals.count
         status.fault = report.fault
         if self._log is not None:
             status.log, status.log_dropped, status.log_fault = str(self._log.path), self._log.dropped, self._log.fault
@@ -122,11 +123,12 @@ class Outputs:
             problems.append((DiagnosticStatus.WARN, lost.strip()))
         if report.dropped:
             problems.append((DiagnosticStatus.WARN, f"{report.dropped} ticks not published"))
+        problems += self._arrivals.problems()
         values = {
             "sim_time": f"{report.time:.3f}",
             "real_time_factor": f"{report.real_time_factor:.4f}",
             "missed_deadlines": report.missed_deadlines,
-            **self._refusals.values(),
+            **self._arrivals.values(),
         }
         message = DiagnosticArray(status=[diagnostic("simulator", problems, values)])
         message.header.stamp = to_time(report.time)

@@ -6,6 +6,7 @@ Not a node: messages come serialised from the publishers (`sbs_sim.nodes.host.To
 import datetime
 import itertools
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from sbs_sim.recording.flight import attachments, simulation_metadata
 from sbs_sim.simulation import Simulation
 from sbs_sim.versions import versions
 
+LONGEST_NAME = 60  # characters of the aircraft's that go into the file's
 CLOSING_TIME = 10.0  # s to get the rest of a log onto the disk
 
 
@@ -104,7 +106,9 @@ def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(f"{folder}: {error.strerror}") from None
-    name = f"{begin:%Y-%m-%d_%H-%M-%S}_{aircraft}"
+    # the name comes from a file that somebody else may have written: it must not lead out of the folder
+    safe = re.sub(r"[^\w.-]+", "_", aircraft)[:LONGEST_NAME]
+    name = f"{begin:%Y-%m-%d_%H-%M-%S}_{safe}"
     others = (folder / f"{name}_{number}.mcap" for number in itertools.count(2))  # of the same second
     return next(path for path in itertools.chain([folder / f"{name}.mcap"], others) if not path.exists())
 

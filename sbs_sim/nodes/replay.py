@@ -18,7 +18,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import rclpy.utilities
 from mcap.records import Channel, Schema
 from nav_msgs.msg import Odometry
 from rclpy.exceptions import NameValidationException
@@ -33,7 +32,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
 from sbs_sim.nodes.executables import INTERRUPTED
-from sbs_sim.nodes.host import DISCOVERY, EVENT_QOS, STATE_QOS, Component, run
+from sbs_sim.nodes.host import DISCOVERY, EVENT_QOS, STATE_QOS, Component, own_arguments, run
 from sbs_sim.nodes.recorder import Recorder, definition_file
 from sbs_sim.recording import Log, message_definition, read, recover
 from sbs_sim.recording.definitions import parse
@@ -52,6 +51,7 @@ LOOK_PERIOD = 0.05  # s between looks at who else is there
 LOOKOUT = 10.0  # s of playing in which somebody may still be discovered: most are at once, but not on a busy machine
 SHORTEST_PASS = 0.05  # s of wall time: a loop over an instant is no flood
 RECOVERED = ".recovered.mcap"
+DEEPEST = 10_000  # messages that a publisher keeps, whatever a log asks for
 
 
 class Replay(Component):
@@ -264,7 +264,7 @@ def recorded_qos(profiles: str) -> QoSProfile:
         keep_all = profile["history"] in ("keep_all", 2)
         return QoSProfile(
             history=HistoryPolicy.KEEP_ALL if keep_all else HistoryPolicy.KEEP_LAST,
-            depth=max(1, int(profile["depth"])),
+            depth=min(max(1, int(profile["depth"])), DEEPEST),
             reliability=_one_of(ReliabilityPolicy, profile["reliability"], ("reliable", 1)),
             durability=_one_of(DurabilityPolicy, profile["durability"], ("transient_local", 1)),
         )
@@ -385,11 +385,10 @@ def _write_flight(flight: Flight, last: int, step_size: float, log: Recorder, st
 
 def main(args: list[str] | None = None) -> None:
     """Do with a log what the command line asks for."""
-    options = _parse(rclpy.utilities.remove_ros_args(args)[1:])
-    if options.recover:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # what is half written is to be taken away
     try:
+        options = _parse(own_arguments(args))
         if options.recover:
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # what is half written is to be taken away
             sys.exit(_recover(options.file, options.output))
         if options.verify:
             sys.exit(_verify(options.file))

@@ -20,9 +20,10 @@ from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.analysis import Analysis
+from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
-from sbs_sim.nodes.host import COMMAND_QOS, Accepted, Component, Parameter, Refusals, declare, run
+from sbs_sim.nodes.host import COMMAND_QOS, Component, Parameter, declare, run
 from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.simulation import Simulation, trimmed_state
 
@@ -73,9 +74,8 @@ class Simulator(Component):
         simulation = self._start(values)
         self.loop = FlightLoop(simulation, values["real_time_factor"], values["command_timeout"])
         self.log = self._make_log(simulation, values)
-        self._refusals = Refusals(self, "swashplate")
-        self._outputs = Outputs(self, self.loop, self._refusals, self.log)
-        self._accepted = Accepted(self, SwashplateArray, "swashplate", COMMAND_QOS, self.log)
+        self._arrivals = Arrivals(self, SwashplateArray, "swashplate", COMMAND_QOS, self.log)
+        self._outputs = Outputs(self, self.loop, self._arrivals, self.log)
         self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
         self.create_service(SetBool, "pause", self._on_pause)
         self.create_service(Step, "step", self._on_step)
@@ -126,11 +126,12 @@ class Simulator(Component):
 
     def _on_swashplate(self, message: SwashplateArray) -> None:
         try:
+            self._arrivals.check_order(message)
             self.loop.command(swashplate_array(message))
         except SbsError as error:
-            self._refusals.add(error)
+            self._arrivals.add(error)
             return
-        self._accepted.keep(message, self.loop.time)
+        self._arrivals.accept(message, self.loop.time)
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         done = "paused" if request.data else "playing"
@@ -159,6 +160,7 @@ class Simulator(Component):
         return self.answer(response, lambda: self.loop.set_wind(lambda now: wind_of(request, now)), "wind set")
 
     def _on_parameters(self, parameters: list[Any]) -> SetParametersResult:
+        """Take over what is set; rclpy has found all that came together to be within its range."""
         try:
             for parameter in parameters:
                 if parameter.name == "real_time_factor":

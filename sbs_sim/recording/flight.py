@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError
 from sbs_sim.model.wind import Wind
@@ -32,6 +33,8 @@ WIND_NUMBERS = ("gust_delay", "gust_duration", "turbulence_length", "turbulence_
 # Other machine code rounds otherwise, and the rotors' fast modes carry that along: what may then differ, relative to
 # the largest magnitude of each state in the flight.
 TOLERANCE = 1e-6
+LATEST_STATE = 10**17  # ns, three years of flight
+LONGEST_GAP = 1e4  # s without a state; to fly through a damaged time would take for ever
 
 
 @dataclass(frozen=True)
@@ -150,12 +153,18 @@ def flight_of(log: Log) -> Flight:
             raise RecordingError("the aircraft in the log is not the one that was flown: its hash differs")
         if not len(log["events"].time) or not len(log["state"].time):
             raise RecordingError("the log holds no flight of sbs_sim: it has no events or no states")
-        step_size = float(simulation["step_size"])
+        step_size = checks.number("step_size", float(simulation["step_size"]), 1e-8, 1.0, "s", RecordingError)
         steps, states = _states(log, aircraft, step_size)
+        if not len(steps):
+            raise RecordingError("the log holds no states")
+        if np.diff(steps, prepend=0).max() * step_size > LONGEST_GAP:
+            raise RecordingError(f"the log has no states for more than {LONGEST_GAP:g} s of its flight")
         options = {name: _option(simulation[name], kind) for name, kind in OPTIONS.items()}
         return Flight(aircraft, options, _events(log, aircraft), steps, states, step_size, dict(recorded), folder)
     except KeyError as error:
         raise RecordingError(f"the log holds no flight of sbs_sim: {error.args[0]} is missing") from None
+    except (ValueError, IndexError, TypeError, OverflowError) as error:  # of our names, but with other contents
+        raise RecordingError(f"the flight in the log makes no sense: {' '.join(str(error).split())}") from None
 
 
 def whole_until(log: Log) -> float:
@@ -188,8 +197,15 @@ def _aircraft(files: Mapping[str, bytes], folder: Path) -> Aircraft:
     """Aircraft of the attached files, which are laid into a folder."""
     (folder / AIRCRAFT_FILE).write_bytes(files[AIRCRAFT_FILE])
     for name, content in files.items():
-        if name.startswith(f"{AIRFOIL_FOLDER}/"):
+        if not name.startswith(f"{AIRFOIL_FOLDER}/"):
+            continue
+        try:
+            if Path(name).suffix != ".csv":
+                raise ValueError("not a .csv file")
             (folder / Path(name).name).write_bytes(content)  # nowhere else, whatever a log calls it
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise RecordingError(f"the log has an attachment {name[:60]!r} that cannot be used: {reason}") from None
     return Aircraft.load(folder / AIRCRAFT_FILE)
 
 
@@ -222,6 +238,9 @@ def _wind(topic: Topic, i: int) -> Wind:
 def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, Array]:
     """Simulation states where all three topics that make them up were recorded."""
     body, rotors, inflow = log["state"], log["rotors"], log["inflow"]
+    for topic in (body, rotors, inflow):
+        if np.abs(topic.time_ns).max(initial=0) > LATEST_STATE:
+            raise RecordingError(f"topic {topic.name} has a time of more than {LATEST_STATE * 1e-9:g} s")
     times, where = _common(body.time_ns, rotors.time_ns, inflow.time_ns)
     layout = aircraft.layout
     states = np.zeros((len(times), layout.size))

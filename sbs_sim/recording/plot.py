@@ -74,7 +74,7 @@ def flight_figure(log: Log) -> Figure:
     RecordingError
         It holds none of them.
     """
-    panels = [(label, curves) for label, make in PANELS.items() if (curves := make(log))]
+    panels = [(label, curves) for label, make in PANELS.items() if (curves := _curves(log, label, make))]
     if not panels:
         raise RecordingError(f"{log.path}: nothing to draw, there are {', '.join(log.topics) or 'no topics'}")
     with rc_context(SETTINGS):
@@ -85,6 +85,13 @@ def flight_figure(log: Log) -> Figure:
             _draw(axes, label, curves)
         rows[-1].set_xlabel("simulation time [s]")
     return figure
+
+
+def _curves(log: Log, label: str, make: Callable[[Log], Curves]) -> Curves:
+    try:
+        return make(log)
+    except (LookupError, TypeError, ValueError) as error:  # topics of our names with other fields
+        raise RecordingError(f"{log.path}: {label} cannot be drawn: {' '.join(str(error).split())}") from None
 
 
 def _draw(axes: Axes, label: str, curves: Curves) -> None:

@@ -26,7 +26,8 @@ from sbs_sim.model.wind import Wind
 from sbs_sim.simulation import Event, Simulation, Snapshot
 
 QUEUE_LENGTH = 100  # snapshots between the flight and their reader: one second at 100 Hz
-FAST_LENGTH = 2  # the same where the flight waits for its reader
+FAST_LENGTH = 2  # the same where the flight waits for its reader: how far a controller is behind
+REACTION = 0.05  # s in which a flight that waits for its reader answers its mail
 HURRY_TICKS = 10  # the schedule is kept by hurrying up to this many ticks; beyond, real time is lost for good
 READER_PATIENCE = 2.0  # s in which a reader takes a report, if there is one
 IDLE_PERIOD = 0.1  # s of wall time between reports while paused
@@ -93,9 +94,9 @@ class FlightLoop:
     def __init__(self, simulation: Simulation, real_time_factor: float = 1.0, command_timeout: float = 0.5) -> None:
         self._simulation = simulation
         self._wake = threading.Condition()
-        self.reports: queue.Queue[Report | None] = queue.Queue(QUEUE_LENGTH)
         self.set_pace(real_time_factor)
         self.set_command_timeout(command_timeout)
+        self.reports: queue.Queue[Report | None] = queue.Queue(QUEUE_LENGTH)
         self._mailbox: collections.deque[tuple[Callable[[], Any], Future[Any]]] = collections.deque()
         self._thread = threading.Thread(target=self._run, name="flight", daemon=True)
         self._playing = True
@@ -138,8 +139,6 @@ class FlightLoop:
     def set_pace(self, real_time_factor: float) -> None:
         """Set the wanted real-time factor, 0 to 1000."""
         pace = checks.number("real_time_factor", real_time_factor, 0.0, 1000.0, "", SimulationError)
-        # Where the flight waits for its reader, what waits to be read is how far a controller is behind.
-        self.reports.maxsize = FAST_LENGTH if pace == 0.0 else QUEUE_LENGTH
         with self._wake:
             self._pace = pace
             self._replan = True
@@ -249,7 +248,7 @@ class FlightLoop:
                 answer.set_exception(SimulationError("the flight has ended"))
 
     def _empty_mailbox(self) -> None:
-        while self._mailbox:
+        while self._mailbox and not self._stopping:
             function, answer = self._mailbox.popleft()
             if not answer.set_running_or_notify_cancel():
                 continue  # its caller has given up
@@ -273,7 +272,7 @@ class FlightLoop:
             pace, replan, self._replan = self._pace, self._replan, False
         if pace == 0.0:
             self._deadline = math.inf
-            return True
+            return self._wait_for_reader()
         now = time.monotonic()
         period = self._simulation.tick / pace
         late = now - self._anchor - self._ticks_due * period
@@ -289,6 +288,11 @@ class FlightLoop:
                 self._wake.wait(min(left, RATE_WINDOW))
         self._deadline = due + period
         return True
+
+    def _wait_for_reader(self) -> bool:
+        """Wait until few reports are left to read; false if that takes long, for there may be mail."""
+        with self.reports.not_full:
+            return self.reports.not_full.wait_for(lambda: len(self.reports.queue) < FAST_LENGTH, REACTION)
 
     def _tick(self) -> None:
         """One tick, with its deadline looked after."""

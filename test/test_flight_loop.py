@@ -16,7 +16,7 @@ import pytest
 
 from sbs_sim import Simulation, simulate
 from sbs_sim.errors import SimulationError
-from sbs_sim.flight_loop import QUEUE_LENGTH, FlightLoop
+from sbs_sim.flight_loop import FAST_LENGTH, QUEUE_LENGTH, FlightLoop
 from sbs_sim.model.state import ATTITUDE, VELOCITY
 from sbs_sim.model.wind import Wind
 from sbs_sim.simulation import trimmed_state
@@ -524,17 +524,46 @@ def test_all_requests_at_once_from_many_threads(sbs, hover, simulation):
         assert all(step % simulation.steps_per_tick == 0 for step in steps)
 
 
+@contextlib.contextmanager
+def held_up(loop):
+    """A flight that is busy with the request of somebody else."""
+    begun, end = threading.Event(), threading.Event()
+
+    def hold():
+        begun.set()
+        assert end.wait(PATIENCE)
+
+    holder = threading.Thread(target=lambda: loop.call(hold, PATIENCE), daemon=True)
+    holder.start()
+    assert begun.wait(PATIENCE)
+    yield
+    end.set()
+    holder.join(PATIENCE)
+
+
 def test_a_call_without_an_answer_is_given_up_and_not_carried_out_later(simulation):
-    """As fast as read, but nobody reads: the flight waits with a full queue."""
     done = []
-    with flying(simulation, reading=False, real_time_factor=AS_FAST_AS_READ) as (loop, reader):
-        wait_until(loop.reports.full)
-        time.sleep(0.05)
-        line = refusal(loop.call, lambda: done.append("late"), 0.2)
-        assert line == "the flight did not answer within 0.2 s"
-        reader.start()
+    with flying(simulation) as (loop, _):
+        with held_up(loop):
+            line = refusal(loop.call, lambda: done.append("late"), 0.2)
+            assert line == "the flight did not answer within 0.2 s"
         loop.call(lambda: done.append("in time"))
         assert done == ["in time"]
+
+
+def test_as_fast_as_read_a_flight_without_a_reader_waits_and_answers(simulation):
+    """It is at most two ticks ahead of what its controller has seen, and nothing is dropped."""
+    with flying(simulation, reading=False, real_time_factor=AS_FAST_AS_READ) as (loop, reader):
+        wait_until(lambda: loop.reports.qsize() >= FAST_LENGTH)
+        time.sleep(0.2)
+        assert loop.call(lambda: simulation.step) <= FAST_LENGTH * simulation.steps_per_tick
+        loop.pause(True)
+        loop.pause(False)
+        reader.start()
+        wait_until(lambda: len(reader.snapshots()) > 10)
+    steps = [snapshot.step for snapshot in reader.snapshots()]
+    assert steps == [i * simulation.steps_per_tick for i in range(len(steps))]
+    assert reader.newest().dropped == 0
 
 
 # -- the end -----------------------------------------------------------------------------------------
@@ -573,7 +602,7 @@ def test_stop_always_ends_with_none_as_the_last_report(simulation, pace, paused)
 
 
 def test_stop_while_the_queue_is_full_and_nobody_reads(simulation):
-    loop = FlightLoop(simulation, real_time_factor=AS_FAST_AS_READ)
+    loop = FlightLoop(simulation, real_time_factor=HURRIED)
     loop.start()
     wait_until(loop.reports.full)
     stop_in_time(loop)
@@ -597,18 +626,19 @@ def test_after_the_end_requests_are_refused_at_once(simulation):
 
 def test_requests_under_way_at_the_end_are_answered(simulation):
     """A caller that waits is told, not left waiting."""
-    loop = FlightLoop(simulation, real_time_factor=AS_FAST_AS_READ)
+    loop = FlightLoop(simulation)
     loop.start()
-    wait_until(loop.reports.full)
-    time.sleep(0.05)
     lines = []
     threads = [
         threading.Thread(target=lambda: lines.append(refusal(loop.call, int, PATIENCE)), daemon=True) for _ in range(3)
     ]
-    for thread in threads:
-        thread.start()
-    time.sleep(0.05)
-    stop_in_time(loop)
-    for thread in threads:
+    with held_up(loop):
+        for thread in threads:
+            thread.start()
+        time.sleep(0.05)
+        stopper = threading.Thread(target=loop.stop, daemon=True)
+        stopper.start()
+        time.sleep(0.05)
+    for thread in (stopper, *threads):
         thread.join(PATIENCE / 2)
     assert lines == ["the flight has ended"] * 3

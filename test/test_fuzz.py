@@ -165,9 +165,15 @@ def test_a_log_with_a_time_beyond_all_bounds_is_not_flown(tmp_path, last, line):
 
 def test_what_a_log_calls_its_types_and_topics_executes_nothing():
     pytest.importorskip("rclpy")
-    from sbs_sim.nodes.replay import message_class
+    from mcap.records import Channel, Schema
 
-    assert message_class("sbs_msgs/msg/Controls").__name__ == "Controls"
+    from sbs_sim.errors import SbsError
+    from sbs_sim.nodes.replay import installed_type
+
+    channel = Channel(id=1, topic="/x", message_encoding="cdr", metadata={}, schema_id=1)
+    kind = installed_type(channel, Schema(id=1, name="sbs_msgs/msg/Controls", encoding="ros2msg", data=b""))
+    assert kind.__name__ == "Controls"
+    before = set(sys.modules)
     for name in (
         "",
         "/",
@@ -177,8 +183,11 @@ def test_what_a_log_calls_its_types_and_topics_executes_nothing():
         "os/path",
         "this/msg/X",
         "sbs_msgs.msg/msg/os",
+        "distutils/msg/Distribution",
     ):
-        assert message_class(name) is None
+        with pytest.raises(SbsError, match="is not installed"):
+            installed_type(channel, Schema(id=1, name=name, encoding="ros2msg", data=b""))
+    assert set(sys.modules) - before <= {"distutils"}
 
 
 @given(st.text(max_size=5))

@@ -106,13 +106,13 @@ def test_no_event_is_lost_with_dropped_reports(sbs, hover):
 
 
 def test_nothing_is_lost_at_the_end_of_a_flight_that_is_faster_than_its_reader(sbs, hover):
-    """The queue is full when the loop is stopped, and the reader is still there."""
+    """Reports wait when the loop is stopped, and the reader is still there."""
     with flying(simulation(sbs, hover), delay=0.005, real_time_factor=AS_FAST_AS_READ) as (loop, reader):
         for command in commands(hover, 20, 6):
             loop.command(command)
             before = loop.time
             wait_until(lambda before=before: loop.time > before + 0.02)
-        wait_until(loop.reports.full)
+        wait_until(loop.reports.qsize)
     steps = [snapshot.step for snapshot in reader.snapshots()]
     assert set(np.diff(steps)) == {steps[-1] - steps[-2]}
     assert_flown_again(sbs, reader)

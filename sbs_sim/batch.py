@@ -155,7 +155,7 @@ def simulate_batch(
         (n_flights, n_rows). The four loads and accelerations take a derivative for every row. Aircraft with fewer
         rotors or other states have NaN in their places.
     tick, **options
-        See `sbs_sim.simulate`: azimuth_step, lead_lag, cyclic_inflow, method.
+        See `sbs_sim.simulate`: azimuth_step, lead_lag, cyclic_inflow, method, ground_altitude.
     workers : int, optional
         Number of threads, one for each core if not given. The results are the same for any number.
     progress : callable, optional
@@ -209,9 +209,10 @@ def _plan(cases: Sequence[Case], duration: float, every: int, outputs: Sequence[
         raise BatchError(f"tick = {options['tick']}: allowed are 0.0001 to 1 s")
     if isinstance(every, bool) or not isinstance(every, int) or every < 1:
         raise BatchError(f"every = {every!r}: allowed are whole numbers from 1")
-    unknown = [name for name in options if name not in ("tick", "azimuth_step", "method", *FIDELITY)]
+    allowed = ("tick", "azimuth_step", "method", "ground_altitude", *FIDELITY)
+    unknown = [name for name in options if name not in allowed]
     if unknown:
-        raise BatchError(f"{unknown[0]}: unknown option, allowed are tick, azimuth_step, method, {', '.join(FIDELITY)}")
+        raise BatchError(f"{unknown[0]}: unknown option, allowed are {', '.join(allowed)}")
     known = {*GROUPS, *(name for case in cases for name in case.aircraft.layout.names)}
     for name in outputs:
         if name not in known:

@@ -24,10 +24,13 @@ from sbs_sim.model import state as S
 from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.fly import fly
 from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
+from sbs_sim.model.ground import lowest_point
 from sbs_sim.model.integrate import PARTITIONED, RK4, TSIT5, advance
 from sbs_sim.model.kernel import Address
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.wind import Wind, WindField, wind_at
+from sbs_sim.model.working_state import WORKING_SIZE, working_state
+from sbs_sim.validity import stall_table
 
 Array = NDArray[np.float64]
 Commands = ArrayLike | Callable[[float], ArrayLike]
@@ -72,6 +75,8 @@ class Snapshot:
         Thrust, torque, hub force and moment, see `sbs_sim.model.params`.
     wind : ndarray, shape (3,)
         Velocity of the air, NED [m/s].
+    working : ndarray, shape (n_rotors, WORKING_SIZE), or None
+        Working states of the rotors, see `sbs_sim.model.working_state`; None where nobody knows them.
     """
 
     step: int
@@ -82,6 +87,7 @@ class Snapshot:
     azimuth: Array
     loads: Array
     wind: Array
+    working: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -152,6 +158,8 @@ class Simulation:
         "rk4"; "tsit5", of fifth order, whose steps may be three times as long; or "partitioned": the paper's scheme,
         whose error is of first order in the step.
     wind : Wind
+    ground_altitude : float
+        Height of level ground above the origin [m]; touching it ends the flight. -inf is no ground.
 
     Raises
     ------
@@ -171,6 +179,7 @@ class Simulation:
         cyclic_inflow: bool = True,
         method: str = "rk4",
         wind: Wind | None = None,
+        ground_altitude: float = -math.inf,
     ) -> None:
         checks.instance("aircraft", aircraft, Aircraft, SimulationError)
         tick = checks.number("tick", tick, *TICKS, "s", SimulationError)
@@ -178,12 +187,14 @@ class Simulation:
         lead_lag = checks.flag("lead_lag", lead_lag, SimulationError)
         cyclic_inflow = checks.flag("cyclic_inflow", cyclic_inflow, SimulationError)
         checks.choice("method", method, tuple(METHODS), SimulationError)
+        ground = checks.number("ground_altitude", ground_altitude, -math.inf, PLAUSIBLE_POSITION, "m", SimulationError)
         self.options: dict[str, Any] = {
             "tick": tick,
             "azimuth_step": azimuth_step,
             "lead_lag": lead_lag,
             "cyclic_inflow": cyclic_inflow,
             "method": method,
+            "ground_altitude": ground,
         }
         self.aircraft = aircraft
         self.layout = aircraft.layout
@@ -201,7 +212,8 @@ class Simulation:
         self._held = held_states(aircraft, lead_lag, cyclic_inflow)
         self._params = aircraft.params(lead_lag, cyclic_inflow)
         self._work = P.make_work(self._params)
-        self._bounds = plausible_bounds(aircraft)
+        self._bounds = np.append(plausible_bounds(aircraft), -ground)
+        self._stall = stall_table(aircraft)
         self._azimuth0 = np.zeros(len(aircraft.rotors))
         self._slope = np.zeros(self.layout.size)
         self.step = 0
@@ -251,7 +263,7 @@ class Simulation:
         values = checks.array("state", state, SimulationError).ravel()
         if len(values) != self.layout.size:
             raise SimulationError(f"state has {len(values)} values: allowed are {self.layout.size}")
-        for name, value, bound in zip(self.layout.names, values, self._bounds, strict=True):
+        for name, value, bound in zip(self.layout.names, values, self._bounds[:-1], strict=True):
             if not abs(value) <= bound:  # true for a NaN as well
                 raise SimulationError(f"state {name} = {value}: allowed are {-bound:g} to {bound:g}")
         quaternion = values[S.ATTITUDE : S.ATTITUDE + 4]
@@ -261,6 +273,11 @@ class Simulation:
         if abs(norm - 1.0) > UNIT:  # what has been normalised once stays as it is, bit for bit
             values[S.ATTITUDE : S.ATTITUDE + 4] = quaternion / norm
         values[self._held] = 0.0
+        lowest, ground = -lowest_point(self._params, values), -self._bounds[-1]
+        if lowest <= ground:
+            raise SimulationError(
+                f"state position: the aircraft reaches down to {lowest:g} m: allowed is above {ground:g} m, the ground"
+            )
         return values
 
     def checked_swashplate(self, angles: ArrayLike) -> Array:
@@ -329,6 +346,12 @@ class Simulation:
 
     def _end(self, culprit: int) -> SimulationError:
         """Why the flight cannot go on: a state that the next step would take beyond the plausible."""
+        if culprit == self.layout.size:
+            speed = float(np.linalg.norm(self.state[S.VELOCITY : S.RATES]))
+            return SimulationError(
+                f"ground contact after step {self.step} (t = {self.time:.4f} s) at {speed:.3g} m/s:"
+                f" the ground is at {-self._bounds[-1]:g} m"
+            )
         value = self._work.stages[0][culprit]
         return SimulationError(
             f"step {self.step + 1} (t = {(self.step + 1) * self.step_size:.4f} s) would take"
@@ -426,7 +449,14 @@ class Simulation:
             azimuth=azimuth,
             loads=self._work.loads.copy(),
             wind=air,
+            working=self._working(),
         )
+
+    def _working(self) -> Array:
+        """Working states at the instant of the last derivative."""
+        rows = np.empty((len(self._azimuth0), WORKING_SIZE))
+        working_state(self._params, self.state, self._stall, self._work, rows)
+        return rows
 
 
 def refly(aircraft: Aircraft, events: Sequence[Event], last_step: int, **options: Any) -> Iterator[Snapshot]:
@@ -562,6 +592,7 @@ def simulate(
     cyclic_inflow: bool = True,
     method: str = "rk4",
     wind: Wind | None = None,
+    ground_altitude: float = -math.inf,
 ) -> Mapping[str, Array]:
     """Fly for a while and return what happened.
 
@@ -575,7 +606,7 @@ def simulate(
         function of time [s] that gives shape (4,).
     duration : float
         [s], rounded to whole ticks.
-    tick, azimuth_step, lead_lag, cyclic_inflow, method, wind
+    tick, azimuth_step, lead_lag, cyclic_inflow, method, wind, ground_altitude
         See `Simulation`. A trim point is flown with the velocity of the steady wind added.
 
     Returns
@@ -600,6 +631,7 @@ def simulate(
         lead_lag=lead_lag,
         cyclic_inflow=cyclic_inflow,
         method=method,
+        ground_altitude=ground_altitude,
     )
     if fault is not None:
         raise fault

@@ -7,7 +7,7 @@ from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.trim import trim
 from sbs_sim.model.kernel import cache_folder
 from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import simulate
+from sbs_sim.simulation import Simulation, simulate, trimmed_state
 
 
 def main() -> None:
@@ -15,6 +15,7 @@ def main() -> None:
     aircraft = Aircraft.load("sbs")
     hover = trim(aircraft)
     simulate(aircraft, hover, hover.controls, duration=0.01, wind=Wind(turbulence_intensity=(1.0, 1.0, 1.0)))
+    Simulation(aircraft, trimmed_state(aircraft, hover), hover.swashplate).snapshot()
     linearize(aircraft, point=hover, method="paper")
     trim(aircraft, method="two_loop")
     folder = cache_folder()

@@ -156,7 +156,7 @@ class Model:
             h,
             air,
             method,
-            np.full(self.layout.size, np.inf),
+            np.full(self.layout.size + 1, np.inf),
             self.work,
         )
         assert done == steps

@@ -29,6 +29,7 @@ from sbs_msgs.msg import (  # noqa: E402
     RotorStateArray,
     SimulationStatus,
     SwashplateArray,
+    WorkingState,
 )
 from sbs_msgs.srv import Reset, SetWind, Step  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
@@ -347,6 +348,40 @@ def test_a_fault_pauses_and_a_reset_cures_it(flight, client):
     assert client.call(SetBool, "pause", data=False).success
     assert client.next("status", lambda m: m.state == SimulationStatus.PLAYING).fault == ""
     assert flight.simulator.running
+
+
+def test_the_status_tells_where_the_model_does_not_hold_and_when_it_does_again(flight, client):
+    assert client.call(Reset, "reset").success
+    calm = client.next("status", lambda m: len(m.working_states) == 2 and not m.warnings)
+    assert [state.inflow_state for state in calm.working_states] == [WorkingState.NORMAL] * 2
+    assert client.call(SetWind, "set_wind", velocity=Vector3(z=-7.0)).success
+    told = client.next("status", lambda m: m.warnings)
+    assert told.warnings == [
+        f"{name}: vortex ring state, where momentum theory does not hold" for name in ("MR1", "MR2")
+    ]
+    assert [state.inflow_state for state in told.working_states] == [WorkingState.VORTEX_RING] * 2
+    assert all(0.45 < state.descent_ratio < 1.5 for state in told.working_states)
+    health = client.next("diagnostics", lambda m: any("vortex ring" in status.message for status in m.status))
+    assert health.status[0].level == DiagnosticStatus.WARN
+    assert client.call(SetWind, "set_wind").success
+    assert client.call(Reset, "reset").success
+    client.next("status", lambda m: not m.warnings)
+
+
+def test_the_ground_ends_a_flight_and_a_reset_flies_on(flight, client):
+    assert not client.call(Reset, "reset", position=Point(z=200.0)).success
+    assert client.call(Reset, "reset", position=Point(z=99.5)).success
+    values = list(Aircraft.load("sbs").layout.names)
+    state = np.zeros(len(values))
+    state[2], state[3], state[9] = 99.5, 1.0, 5.0  # 5 m/s down, half a metre above it
+    assert client.call(Reset, "reset", from_state=True, state=state.tolist()).success
+    ended = client.next("status", lambda m: m.fault)
+    assert ended.state == SimulationStatus.PAUSED
+    assert ended.fault.startswith("ground contact after step ")
+    assert ended.fault.endswith("the ground is at -100 m")
+    assert client.call(Reset, "reset").success
+    assert client.call(SetBool, "pause", data=False).success
+    client.next("status", lambda m: m.state == SimulationStatus.PLAYING and m.fault == "")
 
 
 def test_parameters_can_be_changed_in_flight_and_bad_ones_are_refused(flight, client):

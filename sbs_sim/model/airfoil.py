@@ -48,6 +48,24 @@ class AirfoilTable:
     cd: Array
 
 
+def stall_angles(table: AirfoilTable) -> tuple[Array, Array]:
+    """Angles of attack at which lift first stops to grow away from zero: upwards and downwards.
+
+    Parameters
+    ----------
+    table : AirfoilTable
+
+    Returns
+    -------
+    highest, lowest : ndarray, shape (n_re,)
+        Of each Reynolds number of the table [rad].
+    """
+    zero = len(table.alpha) // 2
+    growing, falling = np.diff(table.cl[:, zero:]) > 0.0, np.diff(table.cl[:, zero::-1]) < 0.0
+    above, below = (np.argmin(np.pad(part, ((0, 0), (0, 1))), axis=1) for part in (growing, falling))
+    return table.alpha[zero + above], table.alpha[zero - below]
+
+
 def viterna(
     alpha: ArrayLike, alpha_stall: float, cl_stall: float, cd_stall: float, aspect_ratio: float
 ) -> tuple[Array, Array]:

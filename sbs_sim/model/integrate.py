@@ -7,6 +7,7 @@ import numpy as np
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.dynamics import evaluate_rotors
+from sbs_sim.model.ground import lowest
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_rotation_terms
 from sbs_sim.model.wind import wind_at
@@ -60,8 +61,8 @@ def advance(p, x, swash, psi0, first_step, steps, h, wind, method, bounds, work)
         Air of this tick.
     method : int
         RK4, PARTITIONED or TSIT5.
-    bounds : ndarray, shape (size,)
-        Largest magnitude of each state that is still plausible.
+    bounds : ndarray, shape (size + 1,)
+        Largest magnitude of each state that is still plausible, and the down coordinate of the ground [m].
     work : Work
 
     Returns
@@ -69,13 +70,13 @@ def advance(p, x, swash, psi0, first_step, steps, h, wind, method, bounds, work)
     done : int
         Steps made; fewer than `steps` if the next one would leave the plausible.
     culprit : int
-        Index of the state that would, -1 if none.
+        Index of the state that would, -1 if none, `size` if the aircraft would touch the ground.
     """
     for i in range(steps):
         fraction = i / steps
         _step(p, x, swash, psi0, first_step + i, h, wind, fraction, 1.0 / steps, method, work)
         new = work.stages[STAGE]
-        culprit = _first_implausible(new, bounds)
+        culprit = _first_implausible(p, new, bounds)
         if culprit >= 0:
             return i, culprit
         _copy(new, x)
@@ -155,9 +156,10 @@ def _freeze_forcing(p, x, stage, first, slope):
 
 
 @kernel
-def _first_implausible(x, bounds):
-    """Index of the first state that is not finite or beyond its bound, -1 if there is none."""
+def _first_implausible(p, x, bounds):
+    """Index of the first state that is not finite or beyond its bound, `size` for the ground, -1 if there is none."""
     for i in range(x.size):
         if not abs(x[i]) <= bounds[i]:
             return i
-    return -1
+    ground = bounds[x.size]
+    return x.size if ground < math.inf and lowest(p, x) >= ground else -1

@@ -26,14 +26,17 @@ from sbs_msgs.msg import (
     NamedMatrix,
     RotorState,
     RotorStateArray,
+    SimulationStatus,
     Swashplate,
     SwashplateArray,
     SweepPoint,
     TrimCondition,
     TrimPoint,
+    WorkingState,
 )
 from sbs_msgs.msg import Wind as WindMessage
 from sbs_msgs.srv import SetWind
+from sbs_sim import validity
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import linearize, modes, sweep, trim
 from sbs_sim.errors import SimulationError
@@ -151,6 +154,24 @@ def _set_vector(target: Vector3 | Point, values: Sequence[float]) -> None:
 def _doubles(values: Array) -> array.array:
     """Array for a float64[] field: this type alone is taken without a look at every element."""
     return array.array("d", values.tobytes())
+
+
+def fill_working_states(status: SimulationStatus, aircraft: Aircraft, snapshot: Snapshot) -> None:
+    """Fill in what the rotors are made to do, and what of that is outside the validity of the model."""
+    if snapshot.working is None:
+        return
+    states = [validity.working_state(row) for row in snapshot.working]
+    status.warnings = validity.warnings(aircraft, snapshot.working)
+    status.working_states = [
+        WorkingState(
+            advance_ratio=state.advance_ratio,
+            descent_ratio=state.descent_ratio,
+            stalled_share=state.stalled_share,
+            reversed_share=state.reversed_share,
+            inflow_state=validity.INFLOW_STATES.index(state.inflow_state),
+        )
+        for state in states
+    ]
 
 
 class StateMessages:

@@ -13,8 +13,8 @@ from rosgraph_msgs.msg import Clock
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray, SimulationStatus
 from sbs_sim.flight_loop import FlightLoop, Report
 from sbs_sim.nodes.arrivals import Arrivals
-from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
-from sbs_sim.nodes.host import EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Topic, diagnostic
+from sbs_sim.nodes.conversions import StateMessages, event_message, fill_working_states, to_time
+from sbs_sim.nodes.host import COMPLAINT_PERIOD, EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Topic, diagnostic
 
 PUBLISHING_TIME = 10.0  # s for what is still to be published at the end
 
@@ -42,6 +42,7 @@ class Outputs:
         self._messages = StateMessages(loop.aircraft)
         self._clock_message, self._status = Clock(), SimulationStatus()
         self._last_report: Report | None = None
+        self._told: list[str] = []
         self._state = Topic(node, BodyState, "state", STATE_QOS, log)
         self._rotors = Topic(node, RotorStateArray, "rotors", STATE_QOS, log)
         self._inflow = Topic(node, InflowArray, "inflow", STATE_QOS, log)
@@ -90,18 +91,25 @@ class Outputs:
         status.dropped_messages = report.dropped
         status.rejected_messages = self._arrivals.count
         status.fault = report.fault
+        if report.snapshot is not None:
+            fill_working_states(status, self._loop.aircraft, report.snapshot)
         if self._log is not None:
             status.log, status.log_dropped, status.log_fault = str(self._log.path), self._log.dropped, self._log.fault
         self._status_topic.publish(status, report.time, wait)
 
     def _say_changes(self, report: Report) -> None:
-        """One log line when a fault or a time-out begins."""
+        """One log line when a fault, a time-out or a departure from what the model describes begins."""
         before, log = self._last_report, self._node.get_logger()
         if report.fault and (before is None or report.fault != before.fault):
             log.error(f"paused: {report.fault}")
         self.say_log_fault()
         if report.command_timed_out and (before is None or not before.command_timed_out):
             log.warning(f"no command for {self._loop.command_timeout:g} s: holding the last one")
+
+        for line in self._status.warnings:
+            if line not in self._told:
+                log.warning(f"outside the model's validity: {line}", throttle_duration_sec=COMPLAINT_PERIOD)
+        self._told = list(self._status.warnings)
 
     def say_log_fault(self) -> None:
         """One log line when the recording has failed."""
@@ -118,6 +126,7 @@ class Outputs:
             problems.append((DiagnosticStatus.ERROR, report.fault))
         if report.command_timed_out:
             problems.append((DiagnosticStatus.WARN, "command timed out, holding the last one"))
+        problems += [(DiagnosticStatus.WARN, f"outside the model's validity: {line}") for line in self._status.warnings]
         if self._log is not None and (self._log.fault or self._log.dropped):
             lost = f"{self._log.dropped} messages not recorded {self._log.fault}"
             problems.append((DiagnosticStatus.WARN, lost.strip()))

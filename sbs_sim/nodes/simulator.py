@@ -41,6 +41,9 @@ PARAMETERS = {
     "turn_rate": Parameter(0.0, "Start: rate of the heading, right positive [rad/s]", -3.0, 3.0),
     "heading": Parameter(0.0, "Start: heading, from north to east [rad]", -math.pi, math.pi),
     "altitude": Parameter(0.0, "Start: height above the origin [m]", -1e5, 1e5),
+    "ground_altitude": Parameter(
+        -100.0, "Height of level ground above the origin [m]; touching it ends the flight until a reset", -1e5, 1e5
+    ),
     "real_time_factor": Parameter(
         1.0, "Simulation time over wall time; 0 is as fast as possible", 0.0, 1000.0, fixed=False
     ),
@@ -107,6 +110,7 @@ class Simulator(Component):
             tick=1.0 / values["publish_rate"],
             azimuth_step=math.radians(values["azimuth_step_deg"]),
             wind=wind,
+            ground_altitude=values["ground_altitude"],
             **self._fidelity,
         )
         angles = ", ".join(

@@ -28,6 +28,7 @@ IntArray = NDArray[np.int64]
 AIRCRAFT_FILE = "aircraft.yaml"
 AIRFOIL_FOLDER = "airfoils"
 OPTIONS = {"tick": float, "azimuth_step": float, "lead_lag": bool, "cyclic_inflow": bool, "method": str}
+GROUND = "ground_altitude"  # an option too; older logs have none
 WIND_VECTORS = ("velocity", "gust", "turbulence_intensity")
 WIND_NUMBERS = ("gust_delay", "gust_duration", "turbulence_length", "turbulence_airspeed", "turbulence_direction")
 # Other machine code rounds otherwise, and the rotors' fast modes carry that along: what may then differ, relative to
@@ -160,6 +161,7 @@ def flight_of(log: Log) -> Flight:
         if np.diff(steps, prepend=0).max() * step_size > LONGEST_GAP:
             raise RecordingError(f"the log has no states for more than {LONGEST_GAP:g} s of its flight")
         options = {name: _option(simulation[name], kind) for name, kind in OPTIONS.items()}
+        options[GROUND] = float(simulation.get(GROUND, "-inf"))
         return Flight(aircraft, options, _events(log, aircraft), steps, states, step_size, dict(recorded), folder)
     except KeyError as error:
         raise RecordingError(f"the log holds no flight of sbs_sim: {error.args[0]} is missing") from None

@@ -1,0 +1,138 @@
+"""Where the model is outside what it describes, in words (theory.md section 6.1)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.model import working_state as W
+from sbs_sim.model.airfoil import stall_angles
+
+Array = NDArray[np.float64]
+
+# Beyond this the inflow over the disc is no longer linear along and across it, and the retreating blade is stalled.
+LARGEST_ADVANCE_RATIO = 0.4
+LARGEST_STALLED = 0.1  # of the disc; the sections know nothing of dynamic stall
+LARGEST_REVERSED = (
+    0.1  # of the disc; reached at an advance ratio of 0.63, where the circle of reverse flow has mu^2 / 4
+)
+# Momentum theory in descent, in hover inflow velocities: the vortex ring state begins and ends where the motion of a
+# helicopter in it becomes unstable, W. Johnson: Model for vortex ring state influence on rotorcraft flight dynamics,
+# NASA/TP-2005-213477; up to twice the hover inflow there is no stream tube, J. G. Leishman: Principles of helicopter
+# aerodynamics, 2nd ed., section 2.13. For open rotors; a duct moves these limits.
+RING_DESCENT = (0.45, 1.5)
+RING_EDGEWISE = 0.95
+WINDMILL_DESCENT = 2.0
+LEAST_INFLOW = 0.002  # hover inflow ratio below which a rotor carries nothing, and has none of these states
+
+NORMAL, UNLOADED, VORTEX_RING, TURBULENT_WAKE, WINDMILL = INFLOW_STATES = (
+    "normal",
+    "unloaded",
+    "vortex ring",
+    "turbulent wake",
+    "windmill",
+)
+
+
+@dataclass(frozen=True)
+class WorkingState:
+    """What a rotor is made to do at an instant.
+
+    Attributes
+    ----------
+    advance_ratio : float
+        Velocity of the hub along the disc, relative to the air, over the tip speed.
+    descent_ratio : float
+        Velocity of the hub against the thrust, relative to the air, over the hover inflow velocity of the present
+        thrust; negative in a climb, zero if the rotor is unloaded.
+    stalled_share, reversed_share : float
+        Of the disc between flap hinge and tip: where sections are stalled, and where the flow comes from behind; as the
+        blades meet it at this instant.
+    inflow_state : str
+        One of `INFLOW_STATES`.
+    """
+
+    advance_ratio: float
+    descent_ratio: float
+    stalled_share: float
+    reversed_share: float
+    inflow_state: str
+
+
+def stall_table(aircraft: Aircraft) -> Array:
+    """Reynolds numbers and stall angles of every rotor as `working_state` takes them, shape (n_rotors, 3, n)."""
+    tables = [aircraft.airfoils[rotor.airfoil] for rotor in aircraft.rotors]
+    size = max(len(table.reynolds) for table in tables)
+    return np.array(
+        [
+            np.pad((table.reynolds, *stall_angles(table)), ((0, 0), (0, size - len(table.reynolds))), "edge")
+            for table in tables
+        ]
+    )
+
+
+def working_state(row: Array) -> WorkingState:
+    """Working state of a rotor.
+
+    Parameters
+    ----------
+    row : ndarray, shape (WORKING_SIZE,)
+        Of `sbs_sim.model.working_state`.
+    """
+    hover = float(row[W.HOVER_INFLOW])
+    loaded = hover >= LEAST_INFLOW
+    descent = float(row[W.DESCENT]) / hover if loaded else 0.0
+    edgewise = float(row[W.ADVANCE_RATIO]) / hover if loaded else 0.0
+    state = inflow_state(descent, edgewise, float(row[W.FLOW]) >= 0.0) if loaded else UNLOADED
+    return WorkingState(float(row[W.ADVANCE_RATIO]), descent, float(row[W.STALLED]), float(row[W.REVERSED]), state)
+
+
+def inflow_state(descent: float, edgewise: float, with_thrust: bool) -> str:
+    """Name of the state of a loaded rotor's inflow.
+
+    Parameters
+    ----------
+    descent : float
+        Velocity against the thrust over the hover inflow velocity.
+    edgewise : float
+        Velocity along the disc over the same.
+    with_thrust : bool
+        The air goes through the disc as the thrust pushes it.
+    """
+    first, last = RING_DESCENT
+    # an ellipse over both velocities
+    width = math.sqrt(max(0.0, 1.0 - (edgewise / RING_EDGEWISE) ** 2))
+    middle, half = (first + last) / 2, (last - first) / 2 * width
+    if width == 0.0:
+        return NORMAL if with_thrust else WINDMILL
+    if abs(descent - middle) <= half:
+        return VORTEX_RING
+    if descent < middle:
+        return NORMAL
+    # Air that still goes through with the thrust solves the equations up to any descent, but air does not do that.
+    return TURBULENT_WAKE if with_thrust or descent < WINDMILL_DESCENT else WINDMILL
+
+
+def warnings(aircraft: Aircraft, rows: Array) -> list[str]:
+    """What is outside the validity of the model, a line each; none of them if all is well.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    rows : ndarray, shape (n_rotors, WORKING_SIZE)
+        Of `sbs_sim.model.working_state`.
+    """
+    found = []
+    for rotor, row in zip(aircraft.rotors, rows, strict=True):
+        state = working_state(row)
+        if state.inflow_state in (VORTEX_RING, TURBULENT_WAKE):
+            found.append(f"{rotor.name}: {state.inflow_state} state, where momentum theory does not hold")
+        if state.advance_ratio > LARGEST_ADVANCE_RATIO:
+            found.append(f"{rotor.name}: advance ratio above {LARGEST_ADVANCE_RATIO:g}")
+        if state.stalled_share > LARGEST_STALLED:
+            found.append(f"{rotor.name}: stall on more than {LARGEST_STALLED:.0%} of the disc, without its dynamics")
+        if state.reversed_share > LARGEST_REVERSED:
+            found.append(f"{rotor.name}: reverse flow on more than {LARGEST_REVERSED:.0%} of the disc")
+    return found

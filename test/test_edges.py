@@ -1,0 +1,287 @@
+"""The edges of the model: what it says of itself there, that it stays finite, and that it comes back; the ground."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sbs_sim import Simulation, simulate
+from sbs_sim.errors import SimulationError
+from sbs_sim.model import state as S
+from sbs_sim.model import working_state as W
+from sbs_sim.model.airfoil import AirfoilTable, stall_angles
+from sbs_sim.model.frames import euler_to_quaternion
+from sbs_sim.model.wind import Wind
+from sbs_sim.simulation import refly, trimmed_state
+from sbs_sim.validity import (
+    NORMAL,
+    TURBULENT_WAKE,
+    UNLOADED,
+    VORTEX_RING,
+    WINDMILL,
+    inflow_state,
+    warnings,
+    working_state,
+)
+
+GUST = 30.0  # m/s
+ATTITUDES = {
+    "nose down": (0.0, -math.pi / 2, 0.0),
+    "nose up": (0.0, math.pi / 2, 0.0),
+    "on its side": (0.0, 0.0, math.pi / 2),
+    "upside down": (0.0, 0.0, math.pi),
+}
+AIRS = {
+    "vortex ring": (0.0, 0.0, -6.0),
+    "turbulent wake": (0.0, 0.0, -18.0),
+    "windmill": (-3.0, 0.0, -25.0),
+    "reverse flow": (-80.0, 0.0, 0.0),
+    "sideways": (0.0, GUST, 0.0),
+    "from above": (0.0, 0.0, GUST),
+    "from below": (0.0, 0.0, -GUST),
+}
+
+
+def hovering(aircraft, point, **options):
+    return Simulation(aircraft, trimmed_state(aircraft, point), point.swashplate, **options)
+
+
+def held(simulation, seconds):
+    """Snapshots of a flight on a stand: the body is put back after every tick."""
+    body = simulation.state[: S.BODY_SIZE].copy()
+    for _ in range(round(seconds / simulation.tick)):
+        simulation.advance()
+        simulation.state[: S.BODY_SIZE] = body
+        yield simulation.snapshot()
+
+
+def end_of(simulation, seconds=10.0):
+    """What ends a flight early; all that is told of it is finite as long as it lasts."""
+    try:
+        for _ in range(round(seconds / simulation.tick)):
+            simulation.advance()
+            snapshot = simulation.snapshot()
+            assert all(np.isfinite(part).all() for part in (snapshot.acceleration, snapshot.loads, snapshot.working))
+    except SimulationError as error:
+        return str(error)
+    return "nothing"
+
+
+def states(snapshot):
+    return [working_state(row) for row in snapshot.working]
+
+
+# --- what rotors are made to do ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("descent", "edgewise", "with_thrust", "expected"),
+    [
+        (0.0, 0.0, True, NORMAL),
+        (-2.0, 0.0, True, NORMAL),
+        (0.3, 0.0, True, NORMAL),
+        (1.0, 0.0, True, VORTEX_RING),
+        (1.0, 0.5, False, VORTEX_RING),
+        (1.0, 1.0, True, NORMAL),  # it flies out of its wake
+        (1.0, 1.0, False, WINDMILL),
+        (1.7, 0.0, False, TURBULENT_WAKE),
+        (2.5, 0.0, True, TURBULENT_WAKE),
+        (2.5, 0.0, False, WINDMILL),
+    ],
+)
+def test_inflow_states_are_those_of_momentum_theory(descent, edgewise, with_thrust, expected):
+    assert inflow_state(descent, edgewise, with_thrust) == expected
+
+
+def test_hover_and_climb_are_within_the_model(sbs, hover):
+    snapshot = hovering(sbs, hover).snapshot()
+    assert warnings(sbs, snapshot.working) == []
+    for state in states(snapshot):
+        assert state.inflow_state == NORMAL
+        assert state.advance_ratio == pytest.approx(0.0, abs=1e-12)
+        assert state.stalled_share == state.reversed_share == 0.0
+    climbing = hovering(sbs, hover, wind=Wind(velocity=(0.0, 0.0, 3.0)))
+    assert all(state.descent_ratio < 0.0 for state in states(climbing.snapshot()))
+
+
+def test_hover_inflow_is_that_of_a_ducted_disc(sbs, hover):
+    """T = rho pi R^2 v^2 / (2 a_w^2), where hover has settled to it."""
+    snapshot = hovering(sbs, hover).snapshot()
+    for j in range(len(sbs.rotors)):
+        uniform = snapshot.state[sbs.layout.inflow(j)][0]
+        assert snapshot.working[j, W.HOVER_INFLOW] == pytest.approx(uniform, rel=0.01)
+        assert snapshot.working[j, W.FLOW] == pytest.approx(uniform)
+
+
+@pytest.mark.parametrize("speed", [40.0, 100.0])
+def test_reverse_flow_is_a_circle_beside_the_hub(sbs, hover, speed):
+    """Of diameter mu R, on the retreating side: r + mu R sin(psi) < 0; summed over the annulus from hinge to tip."""
+    state = trimmed_state(sbs, hover)
+    state[S.BODY_SIZE :] = 0.0
+    simulation = Simulation(sbs, state, hover.swashplate, wind=Wind(velocity=(-speed, 0.0, 0.0)))
+    rotor = sbs.rotors[0]
+    shares = []
+    for _ in range(50):
+        row = simulation.snapshot().working[0]
+        shares.append(row[W.REVERSED])
+        simulation.advance()
+        simulation.state[:] = state
+    mu = speed / (rotor.speed * rotor.radius)
+    assert row[W.ADVANCE_RATIO] == pytest.approx(mu * math.cos(hover.pitch), rel=0.01)
+    edges = np.linspace(rotor.hinge_offset, rotor.radius, 401)
+    r, psi = np.meshgrid((edges[1:] + edges[:-1]) / 2, np.linspace(0.0, 2 * math.pi, 721)[:-1])
+    expected = np.average(r + mu * rotor.radius * np.sin(psi) < 0.0, weights=r)
+    assert np.mean(shares) == pytest.approx(expected, abs=0.01)
+
+
+def test_stall_begins_where_lift_stops_to_grow():
+    alpha = np.radians(np.arange(-180.0, 181.0, 1.0))
+    peaks = np.radians([[9.0, -7.0], [14.0, -12.0]])
+    cl = np.array(
+        [np.where(alpha > 0, np.sin(alpha / a * math.pi / 2), np.sin(alpha / -b * math.pi / 2)) for a, b in peaks]
+    )
+    table = AirfoilTable("x", np.array([1e5, 1e6]), alpha, cl, np.ones_like(cl))
+    highest, lowest = stall_angles(table)
+    np.testing.assert_allclose(highest, peaks[:, 0])
+    np.testing.assert_allclose(lowest, peaks[:, 1])
+
+
+def test_all_of_a_disc_that_stands_across_the_wind_is_stalled(sbs, hover):
+    """At 90 m/s from below the angle of attack is beyond 30 deg even at the tip, which goes at 127 m/s."""
+    snapshot = hovering(sbs, hover, wind=Wind(velocity=(0.0, 0.0, -90.0))).snapshot()
+    assert all(state.stalled_share == pytest.approx(1.0) for state in states(snapshot))
+
+
+def test_mirrored_wind_mirrors_what_the_rotors_do(sbs, hover):
+    left, right = (hovering(sbs, hover, wind=Wind(velocity=(-40.0, y, -5.0))).snapshot().working for y in (-10.0, 10.0))
+    np.testing.assert_allclose(left, right[::-1], atol=1e-9)
+    assert not np.allclose(left, right, atol=1e-4)
+
+
+def test_a_rotor_without_thrust_has_no_inflow_state(sbs, hover):
+    vacuum = sbs.with_value("environment.air_density", 0.0)
+    state = hovering(vacuum, hover).snapshot()
+    assert [found.inflow_state for found in states(state)] == [UNLOADED, UNLOADED]
+
+
+def test_air_drives_a_rotor_in_the_windmill_state(sbs, hover):
+    swashplate = hover.swashplate * 0.0
+    simulation = Simulation(sbs, trimmed_state(sbs, hover), swashplate, wind=Wind(velocity=(-10.0, 0.0, -12.0)))
+    *_, last = held(simulation, 2.0)
+    assert [state.inflow_state for state in states(last)] == [WINDMILL, WINDMILL]
+    assert (last.loads[:, 1] < 0.0).all()  # torque: the shaft has to be held back
+
+
+# --- finite, and back again -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("air", AIRS)
+def test_rotors_come_back_from_every_air(sbs, hover, air):
+    """Three seconds on a stand in that air, six in calm: the thrust is that of hover again, and nothing is told."""
+    simulation = hovering(sbs, hover, wind=Wind(velocity=AIRS[air]))
+    told = set()
+    for snapshot in held(simulation, 3.0):
+        assert np.isfinite(snapshot.state).all()
+        assert np.isfinite(snapshot.loads).all()
+        assert np.isfinite(snapshot.working).all()
+        told.update(warnings(sbs, snapshot.working))
+    if air in ("vortex ring", "turbulent wake", "reverse flow"):
+        assert any(air in line for line in told)
+    simulation.set_wind(Wind())
+    *_, last = held(simulation, 6.0)
+    assert warnings(sbs, last.working) == []
+    np.testing.assert_allclose(last.loads[:, 0], hovering(sbs, hover).snapshot().loads[:, 0], rtol=0.05)
+
+
+@pytest.mark.parametrize("attitude", ATTITUDES)
+@pytest.mark.parametrize("gust", [(0, 0, 0), (GUST, 0, 0), (0, GUST, 0), (0, 0, GUST), (0, 0, -GUST)])
+def test_free_flight_stays_finite_or_ends_in_words(sbs, hover, attitude, gust):
+    """And a reset flies on as if nothing had been."""
+    state = trimmed_state(sbs, hover)
+    state[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(*ATTITUDES[attitude])
+    simulation = Simulation(sbs, state, hover.swashplate, wind=Wind(gust=gust, gust_duration=1.0))
+    end = end_of(simulation, 3.0)
+    assert end == "nothing" or "plausible are magnitudes up to" in end
+    assert np.isfinite(simulation.state).all()
+    simulation.set_wind(Wind())
+    simulation.reset(trimmed_state(sbs, hover), hover.swashplate)
+    for _ in range(50):
+        simulation.advance()
+    assert np.abs(simulation.state[: S.ATTITUDE]).max() < 1e-3  # an unstable hover, undisturbed
+    assert warnings(sbs, simulation.snapshot().working) == []
+
+
+@pytest.mark.parametrize("along", [0.0, 1e-9])
+def test_rates_are_finite_where_no_air_goes_through_the_disc(sbs, hover, along):
+    """V_T of (6.3) is nothing but its guard there: lambda = lambda0 - mu_z = 0, mu = 0."""
+    simulation = hovering(sbs, hover)
+    inflow = simulation.state[sbs.layout.inflow(0)]
+    rotor = sbs.rotors[0]
+    simulation.set_wind(Wind(velocity=(along, 0.0, -inflow[0] * rotor.speed * rotor.radius)))
+    assert simulation.snapshot().working[0, W.FLOW] == pytest.approx(0.0, abs=1e-12)
+    for _ in range(100):
+        simulation.advance()
+    assert np.isfinite(simulation.state).all()
+
+
+# --- ground -----------------------------------------------------------------------------------------------------
+
+
+def fall(aircraft, point, ground, attitude=(0.0, 0.0, 0.0)):
+    """Fall without air until the ground ends it; the simulation and what it says."""
+    vacuum = aircraft.with_value("environment.air_density", 0.0)
+    state = trimmed_state(aircraft, point)
+    state[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(*attitude)
+    state[S.BODY_SIZE :] = 0.0
+    simulation = Simulation(vacuum, state, point.swashplate, ground_altitude=ground, lead_lag=False)
+    return simulation, end_of(simulation)
+
+
+@pytest.mark.parametrize("attitude", [(0.0, 0.0, 0.0), (1.0, 0.0, math.pi / 2), (0.0, 0.5, 0.3)])
+def test_a_falling_aircraft_touches_the_ground_with_its_lowest_point(sbs, hover, attitude):
+    """Free fall takes sqrt(2 h / g) from the lowest of c.g. and rims."""
+    _, pitch, roll = attitude
+    reach = 0.0
+    for rotor in sbs.rotors:
+        x, y, z = rotor.hub
+        down = -x * math.sin(pitch) + (y * math.sin(roll) + z * math.cos(roll)) * math.cos(pitch)
+        reach = max(reach, down + rotor.radius * math.sqrt(1.0 - (math.cos(roll) * math.cos(pitch)) ** 2))
+    simulation, told = fall(sbs, hover, -2.0, attitude)
+    expected = math.sqrt(2 * (2.0 - reach) / sbs.environment.gravity)
+    assert simulation.time == pytest.approx(expected, abs=simulation.step_size + 2e-3)
+    speed = sbs.environment.gravity * simulation.time
+    assert told == (
+        f"ground contact after step {simulation.step} (t = {simulation.time:.4f} s) at {speed:.3g} m/s:"
+        " the ground is at -2 m"
+    )
+
+
+def test_after_the_ground_a_reset_flies_on(sbs, hover):
+    simulation, _ = fall(sbs, hover, -1.0)
+    with pytest.raises(SimulationError, match="ground contact"):
+        simulation.advance()
+    simulation.reset(trimmed_state(sbs, hover), hover.swashplate)
+    simulation.advance()
+
+
+def test_nothing_begins_below_the_ground(sbs, hover):
+    line = "state position: the aircraft reaches down to -.*: allowed is above 0 m, the ground"
+    with pytest.raises(SimulationError, match=line):
+        hovering(sbs, hover, ground_altitude=0.0)
+    with pytest.raises(SimulationError, match="ground_altitude = nan: allowed are -inf to 1e"):
+        hovering(sbs, hover, ground_altitude=math.nan)
+
+
+def test_a_whole_flight_ends_at_the_same_step(sbs, hover):
+    """`simulate`, tick by tick, and flown again from its events."""
+    controls = hover.controls * [0.5, 1.0, 1.0, 1.0]
+    simulation = hovering(sbs, hover, ground_altitude=-3.0)
+    simulation.set_swashplate(sbs.mix(controls))
+    start = simulation.beginning()
+    flown = end_of(simulation)
+    with pytest.raises(SimulationError) as whole:
+        simulate(sbs, hover, controls, 10.0, ground_altitude=-3.0)
+    assert str(whole.value) == flown
+    with pytest.raises(SimulationError) as again:
+        list(refly(sbs, [start], 10**6, **simulation.options))
+    assert str(again.value) == flown

@@ -7,13 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from plain_ratio import plain_rows
+from plain_ratio import package_calls, plain_rows
 
 from sbs_sim import Aircraft, simulate, trim
 from sbs_sim.analysis.trim import TrimPoint
-from sbs_sim.model import params as P
 from sbs_sim.model import state as S
-from sbs_sim.model.average import averaged_derivative
 from sbs_sim.simulation import trimmed_state
 
 Row = tuple[str, float, str, str]
@@ -51,9 +49,8 @@ def model_rows(timed: Timed) -> list[Row]:
 
 def derivatives(aircraft: Aircraft, x: Any, swash: Any) -> Callable[[], None]:
     """Many complete derivatives, all over the azimuth."""
-    p = aircraft.params()
-    work, dx, loads = P.make_work(p), np.zeros_like(x), np.zeros((len(aircraft.rotors), P.LOAD_SIZE))
-    return lambda: averaged_derivative(p, x, swash, CALLS, np.zeros(3), work, dx, loads)
+    call, _ = package_calls(aircraft, x, swash)
+    return lambda: call(CALLS)
 
 
 # --- flights ----------------------------------------------------------------------------------------------------

@@ -1,7 +1,6 @@
 """A dask cluster as a place for calls: aircraft travel as data, and workers that would give other bits are refused."""
 
 import functools
-import hashlib
 import importlib.metadata
 import pickle
 import socket
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import ClusterError, SbsError
+from sbs_sim.model.kernel import digest_of
 from sbs_sim.versions import versions
 
 if TYPE_CHECKING:
@@ -152,6 +152,5 @@ def _folder(contents: bytes) -> "tempfile.TemporaryDirectory[str]":
 def _versions() -> dict[str, str]:
     """What decides the bits of trims, linear models and flights."""
     package = Path(__file__).parent
-    sources = sorted(path for pattern in SOURCES for path in package.glob(pattern))
-    digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+    digest = digest_of(path for pattern in SOURCES for path in package.glob(pattern))
     return {**versions(), "scipy": importlib.metadata.version("scipy"), "sources": digest}

@@ -1,11 +1,13 @@
 """Real processes and a real DDS participant for the tests of the nodes; everything stays on loopback."""
 
+import collections
 import contextlib
-import itertools
+import fcntl
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -22,10 +24,39 @@ from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
 
 EXECUTABLES = Path(__file__).resolve().parent.parent / "install" / "sbs_sim" / "lib" / "sbs_sim"
-# Of 100 domains every process of a parallel test run has its own 25.
-_WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % 4
-DOMAINS = itertools.cycle(1 + 25 * _WORKER + (os.getpid() + i) % 25 for i in range(25))
+LAST_DOMAIN = 101  # the ports of later ones are those that Linux gives to anybody
+HELD_DOMAINS = 25
 PATIENCE = 30.0  # s of wall time; generous, for machines that are busy
+
+
+def _domains() -> Iterator[int]:
+    """DDS domains that no other test run on this machine has now: each is locked until so many later ones are."""
+    held: collections.deque[tuple[int, Any]] = collections.deque()
+    while True:
+        for i in range(LAST_DOMAIN):
+            domain = 1 + (37 * os.getpid() + i) % LAST_DOMAIN
+            if (lock := _locked(domain)) is not None:
+                break
+        else:  # all are taken, a good part of them by this process
+            domain, lock = held.popleft()
+        held.append((domain, lock))
+        yield domain
+        if len(held) > HELD_DOMAINS:
+            held.popleft()[1].close()
+
+
+def _locked(domain: int) -> Any:
+    """Open file that holds the lock of a domain; None if another has it."""
+    file = (Path(tempfile.gettempdir()) / f"sbs_sim-domain-{domain}.lock").open("w")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.close()
+        return None
+    return file
+
+
+DOMAINS = _domains()
 
 
 def environment(domain: int, folder: Path | None = None) -> dict[str, str]:

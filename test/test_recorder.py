@@ -753,3 +753,17 @@ def test_the_log_that_comes_along_is_flown_again():
     found = replay("--verify", HOVER_STEP)
     assert found.returncode == 0, found.stdout
     assert "identical" in found.stdout or "within" in found.stdout
+
+
+def test_commands_act_at_their_time_on_rotors_of_another_speed(tmp_path, hover):
+    """Faster rotors take more steps to a tick, and the events are counted in steps."""
+    path = fly(tmp_path, lambda made: wiggle(made, hover, 0.5))
+    fast = tmp_path / "fast.mcap"
+    changes = [f"rotors[{j}].speed_rpm=3000" for j in (0, 1)]
+    found = replay("--with", changes[0], "--with", changes[1], "--output", fast, path)
+    assert found.returncode == 0, found.stderr
+    before, after = read(path), read(fast)
+    # 0.01 s are 29 steps of 5 deg at most at 2400 rpm, 36 at 3000 rpm
+    np.testing.assert_array_equal(after["events"]["step"] / 36, before["events"]["step"] / 29)
+    assert after["state"].time[-1] == pytest.approx(before["state"].time[-1])
+    assert_identical(fast)

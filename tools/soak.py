@@ -7,10 +7,11 @@ turbulence, step by step. Then minutes of real time in which eight clients call 
 open files of the simulator are taken all along and drawn (memory.svg); no request may stay without an answer, and the
 logs must be flown again bit for bit. The exit code is 1 if something of that does not hold.
 
-A flight of hours makes a log of about 0.9 GB an hour in the folder; it is verified and deleted.
+A flight of hours makes a log of about 50 MB an hour in the folder; it is verified and deleted.
 """
 
 import argparse
+import contextlib
 import json
 import random
 import sys
@@ -31,7 +32,7 @@ from hover_controller import HoverLaw  # noqa: E402
 from ros_harness import DOMAINS, Client, World, controls_message, world  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 
-from sbs_msgs.msg import BodyState, Controls, SimulationStatus  # noqa: E402
+from sbs_msgs.msg import BodyState, Controls, SimulationStatus, SwashplateArray  # noqa: E402
 from sbs_msgs.srv import Linearize, Reset, SetWind, Step, Trim  # noqa: E402
 from sbs_sim import Aircraft  # noqa: E402
 from sbs_sim.model.frames import quaternion_to_euler  # noqa: E402
@@ -40,7 +41,7 @@ TURBULENCE = Vector3(x=1.5, y=1.5, z=0.8)  # m/s, moderate air near the ground
 WARM = 0.2  # share of the time after which the memory must not grow any more
 GROWTH = 0.05  # of it
 CLIENTS = 8
-TICKS = 2  # between two controls: 50 Hz
+RATE = 12.5  # Hz, of states and controls in the long flight: each of them is published, recorded and answered
 PATIENCE = 60.0  # s for an answer while seven others ask
 
 
@@ -79,7 +80,7 @@ def is_flat(rows: np.ndarray) -> tuple[bool, str]:
 
 def fly(made: World, hours: float, log: Path) -> tuple[list[str], bool, np.ndarray]:
     """Hold hover for hours of simulated time; what happened, whether that is good, and the memory."""
-    simulator = made.start("simulator", real_time_factor=0.0, record=log)
+    simulator = made.start("simulator", real_time_factor=0.0, publish_rate=RATE, record=log)
     client = made.client
     client.watch("state", BodyState)
     client.next("state")
@@ -100,33 +101,38 @@ def fly(made: World, hours: float, log: Path) -> tuple[list[str], bool, np.ndarr
 
 
 def _hold(made: World, seconds: float) -> tuple[float, float, str]:
-    """Hold hover step by step, so that no load on the machine comes between state and control.
+    """Hold hover step by step, every command in force before the next, so that no load on the machine comes between.
 
     Returns the time flown [s], the largest distance from the place along an axis [m], and why it ended early.
     """
     client, law = made.client, HoverLaw(Aircraft.load("sbs"))
     steps = client.node.create_client(Step, "step")
     pilot = client.node.create_publisher(Controls, "controls", 1)
-    states = client.messages["state"]
-    request, time_now, farthest = Step.Request(ticks=TICKS), 0.0, 0.0
+    states, plates = client.messages["state"], client.watch("swashplate", SwashplateArray)
+    request, time_now, farthest = Step.Request(ticks=1), 0.0, 0.0
     first: float | None = None
-    while first is None or time_now - first < seconds:
-        state = states[-1]
-        del states[:-1]
-        position = point(state.position)
-        farthest = max(farthest, float(np.abs(position).max()))
-        q = state.attitude
-        euler = quaternion_to_euler(np.array([q.w, q.x, q.y, q.z]))
-        message = controls_message(law.controls(position, euler, point(state.velocity), point(state.angular_velocity)))
-        message.header.stamp = state.header.stamp
-        pilot.publish(message)
-        answer = steps.call_async(request)
-        client.until(answer.done, "a step")
-        if not answer.result().success:
-            return time_now, farthest, answer.result().message
-        time_now = answer.result().sim_time
-        first = time_now if first is None else first
-        client.until(lambda flown=time_now: stamp(states[-1]) > flown - 1e-6, "its state")
+    with contextlib.suppress(KeyboardInterrupt):  # what has been flown by then is told
+        while first is None or time_now - first < seconds:
+            state = states[-1]
+            del states[:-1]
+            position = point(state.position)
+            farthest = max(farthest, float(np.abs(position).max()))
+            q = state.attitude
+            euler = quaternion_to_euler(np.array([q.w, q.x, q.y, q.z]))
+            message = controls_message(
+                law.controls(position, euler, point(state.velocity), point(state.angular_velocity))
+            )
+            message.header.stamp = state.header.stamp
+            pilot.publish(message)
+            client.until(lambda since=state: plates and stamp(plates[-1]) > stamp(since) - 1e-6, "its swashplate")
+            del plates[:-1]
+            answer = steps.call_async(request)
+            client.until(answer.done, "a step")
+            if not answer.result().success:
+                return time_now, farthest, answer.result().message
+            time_now = answer.result().sim_time
+            first = time_now if first is None else first
+            client.until(lambda flown=time_now: stamp(states[-1]) > flown - 1e-6, "its state")
     return time_now, farthest, ""
 
 

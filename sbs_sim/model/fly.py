@@ -1,6 +1,7 @@
 """Many ticks in one call of compiled code, so that flights side by side do not wait for Python."""
 
-from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.integrate import copy_numbers
+from sbs_sim.model.kernel import entry
 
 
 @entry
@@ -48,12 +49,12 @@ def fly(
     row = 0
     for i in range(swash.shape[0]):
         if i == offset + row * every:
-            _copy(x, states[row])
+            copy_numbers(x, states[row])
             if loaded:
                 derivative(p, x, swash[i], azimuths[row], air[row], work, slope)
-                _copy(work.vector[:3], forces[row])
+                copy_numbers(work.vector[:3], forces[row])
                 for j in range(loads.shape[1]):
-                    _copy(work.loads[j], loads[row, j])
+                    copy_numbers(work.loads[j], loads[row, j])
             row += 1
         if i == ticks:
             break
@@ -62,10 +63,3 @@ def fly(
         if culprit >= 0:
             return step, culprit
     return step, -1
-
-
-@kernel
-def _copy(source, target):
-    """Copy numbers one by one: a slice would be allocated."""
-    for i in range(source.size):
-        target[i] = source[i]

@@ -79,7 +79,7 @@ def advance(p, x, swash, psi0, first_step, steps, h, wind, method, bounds, work)
         culprit = _first_implausible(p, new, bounds)
         if culprit >= 0:
             return i, culprit
-        _copy(new, x)
+        copy_numbers(new, x)
     return steps, -1
 
 
@@ -106,7 +106,7 @@ def _step(p, x, swash, psi0, number, h, wind, fraction, share, method, work):
 def _combine(x, stages, factors, count, h):
     """Set the stage row to x plus h times a sum of the first slopes; the sum of its factors is returned."""
     stage = stages[STAGE]
-    _copy(x, stage)
+    copy_numbers(x, stage)
     ahead = 0.0
     for m in range(count):
         factor = factors[m]
@@ -119,8 +119,8 @@ def _combine(x, stages, factors, count, h):
 
 
 @kernel
-def _copy(source, target):
-    """Copy a state, element by element: a slice would be allocated."""
+def copy_numbers(source, target):
+    """Copy numbers one by one: a slice would be allocated."""
     for i in range(source.size):
         target[i] = source[i]
 

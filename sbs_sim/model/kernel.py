@@ -9,7 +9,7 @@ import contextlib
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -95,8 +95,12 @@ def cache_folder() -> Path:
 
 def source_digest() -> str:
     """Digest of all sources of the compiled model, 16 hexadecimal digits."""
-    sources = sorted(Path(__file__).parent.glob("*.py"))
-    return hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+    return digest_of(Path(__file__).parent.glob("*.py"))
+
+
+def digest_of(files: Iterable[Path]) -> str:
+    """Digest of the contents of files in the order of their paths, 16 hexadecimal digits."""
+    return hashlib.sha256(b"\0".join(path.read_bytes() for path in sorted(files))).hexdigest()[:16]
 
 
 def _writable(folder: Path) -> bool:

@@ -301,7 +301,7 @@ def fly_with(
     -------
     path : Path
     steps : int
-        Flown; fewer than wanted if the changed aircraft ended in a fault.
+        Flown, in those of the recorded flight; fewer than wanted if the changed aircraft ended in a fault.
 
     Raises
     ------
@@ -315,16 +315,20 @@ def fly_with(
     if start.state is None or start.swashplate is None:
         raise RecordingError("the log lacks the start of its flight")
     simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **flight.options)
+    # rotors of another speed have another step: what acted acts at the same time
+    shorter = flight.step_size / simulation.step_size
+    events = tuple(replace(event, step=round(event.step * shorter)) for event in flight.events)
     log = Recorder(str(output), simulation, {"with": list(changes)})
     try:
-        steps = _write_flight(replace(flight, aircraft=aircraft), last, simulation.step_size, log, stop)
+        changed_flight = replace(flight, aircraft=aircraft, events=events)
+        steps = _write_flight(changed_flight, round(last * shorter), simulation.step_size, log, stop)
     except BaseException:  # an interruption too: half a flight looks like a whole one
         log.discard()
         raise
     log.close()
     if log.fault:
         raise RecordingError(log.fault)
-    return log.path, steps
+    return log.path, round(steps / shorter)
 
 
 def changed(aircraft: Aircraft, change: str) -> Aircraft:

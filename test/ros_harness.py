@@ -20,8 +20,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
+from sbs_sim.nodes.host import keep_to_this_machine
 
 EXECUTABLES = Path(__file__).resolve().parent.parent / "install" / "sbs_sim" / "lib" / "sbs_sim"
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+keep_to_this_machine()
 # Of 100 domains every process of a parallel test run has its own 25.
 _WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % 4
 DOMAINS = itertools.cycle(1 + 25 * _WORKER + (os.getpid() + i) % 25 for i in range(25))
@@ -30,7 +33,7 @@ PATIENCE = 30.0  # s of wall time; generous, for machines that are busy
 
 def environment(domain: int, folder: Path | None = None) -> dict[str, str]:
     """Environment of a process in a DDS domain of its own on this machine, its logs in a folder."""
-    own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    own = {"ROS_DOMAIN_ID": str(domain)}
     return {**os.environ, **own, **({"SBS_SIM_BAGS": str(folder / "bags")} if folder else {})}
 
 

@@ -168,8 +168,8 @@ def test_a_smaller_limit_holds_more_tightly(model, found):
     ("limits", "text"),
     [
         ({"forwards": 1.0}, "limit forwards: unknown, allowed are u, v, w"),
-        ({"forward": 0.0}, "limit forward = 0.0: allowed are positive numbers"),
-        ({"u": math.nan}, "limit u = nan: allowed are positive numbers"),
+        ({"forward": 0.0}, "limit forward = 0.0: allowed are 0.0001 to 10000"),
+        ({"u": math.nan}, "limit u = nan: allowed are 0.0001 to 10000"),
         ({"heading": 1e-4, "r": 1e-3}, "the complete model has a pole at"),
     ],
 )

@@ -60,7 +60,7 @@ def test_the_field_passes_with_the_airspeed_and_never_stands(sbs):
 @pytest.mark.parametrize(
     ("error", "options", "line"),
     [
-        (BatchError, {"flights": 0}, "flights = 0: allowed are whole numbers from 1"),
+        (BatchError, {"flights": 0}, "flights = 0: allowed are whole numbers from 1 to 1000000"),
         (BatchError, {"seed": -1}, "seed = -1: allowed are whole numbers from 0 to 2^64 - 1"),
         (BatchError, {"spread": {"body.mass": 2.0}}, "spread of body.mass = 2.0: allowed are 0 to 1"),
         (BatchError, {"spread": {"body.mass": "x"}}, "spread of body.mass = 'x': allowed are 0 to 1"),
@@ -140,5 +140,5 @@ def test_the_command_prints_percentiles_and_writes_files(tmp_path):
 
 
 def test_the_command_tells_what_is_wrong_in_one_line():
-    assert failure("batch", "--flights", 0) == "--flights 0: allowed are 1 to 1000000"
+    assert failure("batch", "--flights", 0) == "flights = 0: allowed are whole numbers from 1 to 1000000"
     assert failure("batch", "--workers", 2, "--dask", "x").startswith("workers = 2: not allowed with dask")

@@ -890,11 +890,10 @@ OPTIONS["gusts"] = {
     ),
     "--json": TARGETS,
 }
+SHORT_BATCH = ["--flights", "2", "--duration", "0.05", "--azimuth-count", "2"]
 POSITIONALS = {
-    "batch": st.just(["--flights", "2", "--duration", "0.05", "--azimuth-count", "2"]) | st.lists(WORDS, max_size=1),
-    "gusts": st.sampled_from(
-        [["--duration", "1"], ["x"], ["--delay", "-1"], ["--limit", "forward=0"], ["--seed", "-1"]]
-    ),
+    "batch": st.sampled_from([[], ["x"], ["--every", "0"], ["--spread", "name=1"]]).map(SHORT_BATCH.__add__),
+    "gusts": st.sampled_from([["x"], ["--delay", "-1"], ["--limit", "forward=0"], ["--seed", "-1"]]),
     "trim": st.just([]) | st.lists(WORDS, max_size=1),
     "linearize": st.just([]) | st.lists(WORDS, max_size=1),
     "sweep": st.sampled_from(
@@ -918,6 +917,8 @@ def command_lines(draw: Any) -> tuple[str, list[str]]:
     name = draw(st.sampled_from(COMMANDS))
     words = list(draw(POSITIONALS[name]))
     for option in draw(st.lists(st.sampled_from(sorted(OPTIONS[name])), max_size=3)):
+        if name == "gusts" and option == words[0]:
+            continue  # a right one would fly for seconds
         value = OPTIONS[name][option]
         words += [option] if value is None else [option, draw(value)]
     return name, words

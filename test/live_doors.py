@@ -337,7 +337,8 @@ class Pilots:
         assert served(self.port)
         for name, part in self.parts.items():
             assert "internal error" not in part.output, f"{name}:\n{part.output[-3000:]}"
-            assert "Traceback" not in part.output, f"{name}:\n{part.output[-3000:]}"
+            if name in PILOTS:  # the page's server prints what it could not make of a client's messages
+                assert "Traceback" not in part.output, f"{name}:\n{part.output[-3000:]}"
 
     def doors(self) -> tuple[Door, ...]:
         """The doors of the pilots, and of the cockpit to messages."""

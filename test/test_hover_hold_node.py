@@ -12,11 +12,11 @@ from geometry_msgs.msg import PoseStamped  # noqa: E402
 from ros_harness import DOMAINS, world  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 
-from sbs_msgs.msg import BodyState, Controls, SimulationStatus  # noqa: E402
+from sbs_msgs.msg import BodyState, Controls, FlightEvent, SimulationStatus  # noqa: E402
 from sbs_msgs.srv import Reset, SetWind  # noqa: E402
 from sbs_sim.errors import PilotError  # noqa: E402
 from sbs_sim.model.frames import euler_to_quaternion, quaternion_to_euler  # noqa: E402
-from sbs_sim.nodes.pilot_conversions import to_target  # noqa: E402
+from sbs_sim.nodes.pilot_conversions import check_event, to_target  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +131,20 @@ def test_a_refused_target_is_told_and_moves_nothing(flight, client, message, tex
     client.publish("target", message)
     client.until(lambda: text in flight.hold.output, text)
     assert np.linalg.norm(place_of(client.next("state")) - before) < 2.0
+
+
+BAD_EVENTS = {
+    "a NaN in a state": {"kind": "reset", "state": [math.nan] * 43},
+    "half a state": {"kind": "start", "state": [0.0, 0.0, 0.0, 1.0]},
+    "no attitude": {"kind": "reset", "state": [0.0] * 43},
+    "an infinite angle": {"kind": "swashplate", "swashplate": [math.inf] * 6},
+}
+
+
+@pytest.mark.parametrize("given", BAD_EVENTS.values(), ids=BAD_EVENTS)
+def test_no_pilot_begins_from_an_event_that_is_none(given):
+    with pytest.raises(PilotError, match="allowed"):
+        check_event(FlightEvent(**given))
 
 
 def test_after_a_reset_it_stays_where_it_was_put(client):

@@ -65,7 +65,7 @@ def test_keys_fly_and_ctrl_c_gives_the_terminal_back(flight, terminal):
     assert teleop.hands_over_keys
     client.next("controls", near_trim)
 
-    teleop.type("www")  # the collective stays
+    teleop.type("\x13www")  # Ctrl-S holds up no output, and so no flight; the collective stays
     raised = TRIM[0] + math.radians(3.0) * shaped(0.3, 0.0, 0.5)
     client.next("controls", lambda message: abs(message.collective - raised) < 1e-9)
     client.next("state", lambda state: state.velocity.z < -0.05)

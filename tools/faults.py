@@ -167,6 +167,7 @@ def replayed(log: Path, *options: str) -> str:
 def killed(*victims: str) -> tuple[str, bool]:
     """Kill -9 of parts; the rest goes on and says what is missing; the parts come back and join."""
     with system() as made:
+        made.client.until(lambda: len(made.swashplates) > 20, "commands")  # who has not been there is not missed
         made.client.spin(2.0)
         steps = made.status().steps
         for victim in victims:

@@ -222,7 +222,7 @@ def _guided(reader: str, seconds: float, number: int) -> int:
             command, cwd=name, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True, check=False
         )
         if "No module named 'atheris'" in ended.stderr:
-            print(f"{reader}, guided: atheris is not installed: ./run python -m pip install atheris==3.1.0")
+            print(f"{reader}, guided: atheris is not installed: ./run python -m pip install atheris==3.0.0")
             return 1
         done = [line for line in ended.stderr.splitlines() if "DONE" in line or "cov:" in line]
         print(f"{reader}, guided: {done[-1] if done else ended.stderr[-2000:]}")

@@ -187,3 +187,18 @@ def test_without_a_simulator_it_ends_with_one_line(tmp_path):
         process = made.start("hover_hold", patience=1.0)
         assert process.wait() == 1
         assert process.output.splitlines()[-1] == "no service linearize within 1 s: is a simulator running?"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("patience", 0.0, "1 to 3600"),
+        ("position_limit", "nan", "0.05 to 10"),
+        ("largest_distance", 1e6, "0.1 to 100000"),
+    ],
+)
+def test_a_parameter_out_of_range_is_one_line(tmp_path, name, value, allowed):
+    with world(next(DOMAINS), tmp_path) as made:
+        process = made.start("hover_hold", **{name: f".{value}" if value == "nan" else value})
+        assert process.wait() == 1
+        assert process.output.splitlines() == [f"parameter {name} = {value}: allowed are {allowed}"]

@@ -112,12 +112,20 @@ def test_a_signal_while_it_starts_gives_the_terminal_back(terminal, number):
     assert teleop.modes == teleop.before
 
 
-def test_an_error_at_the_start_gives_the_terminal_back(terminal):
-    teleop = terminal("-p", "aircraft:=zeppelin")
+@pytest.mark.parametrize(
+    ("parameter", "line"),
+    [
+        ("aircraft:=zeppelin", "aircraft = 'zeppelin': allowed are a file's path or one of"),
+        ("expo:=.nan", "parameter expo = nan: allowed are 0 to 1"),
+        ("cyclic_deg:=50", "parameter cyclic_deg = 50.0: allowed are 0.1 to 20"),
+    ],
+)
+def test_an_error_at_the_start_gives_the_terminal_back(terminal, parameter, line):
+    teleop = terminal("-p", parameter)
     assert teleop.wait() == 1
     time.sleep(0.3)  # for the reader of its output
     assert teleop.modes == teleop.before
-    assert "aircraft = 'zeppelin': allowed are a file's path or one of" in teleop.output
+    assert line in teleop.output
     assert "Traceback" not in teleop.output
 
 

@@ -61,7 +61,7 @@ def test_the_field_passes_with_the_airspeed_and_never_stands(sbs):
     ("error", "options", "line"),
     [
         (BatchError, {"flights": 0}, "flights = 0: allowed are whole numbers from 1 to 1000000"),
-        (BatchError, {"seed": -1}, "seed = -1: allowed are whole numbers from 0 to 2^64 - 1"),
+        (BatchError, {"seed": -1}, "seed = -1: allowed are whole numbers from 0 to 18446744073709551615"),
         (BatchError, {"spread": {"body.mass": 2.0}}, "spread of body.mass = 2.0: allowed are 0 to 1"),
         (BatchError, {"spread": {"body.mass": "x"}}, "spread of body.mass = 'x': allowed are 0 to 1"),
         (BatchError, {"spread": {"rotors.hub": 0.1}}, "spread of rotors.hub: its value "),

@@ -308,9 +308,9 @@ def test_what_is_not_finite_is_refused_and_changes_nothing(found):
     pilot = pilot_to(found)
     body = np.array([*[0.0] * 3, 1.0, *[0.0] * 9])
     before = pilot.controls(0.0, body)
-    with pytest.raises(PilotError, match="allowed are -1e.09 to 1e.09"):
+    with pytest.raises(PilotError, match=r"allowed are -1e.09 to 1e.09"):
         pilot.controls(0.0, np.where(np.arange(13) == 9, np.nan, body))
-    with pytest.raises(PilotError, match="allowed are 3 numbers up to 1e.09 m"):
+    with pytest.raises(PilotError, match=r"allowed are 3 numbers up to 1e.09 m"):
         pilot.hold((0.0, math.inf, 0.0), 0.0)
     np.testing.assert_array_equal(pilot.controls(0.0, body), before)
 

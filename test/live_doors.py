@@ -384,6 +384,7 @@ class Page:
             subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
             additional_headers=headers,
             max_size=None,
+            ping_interval=None,  # while the other doors have their turn nobody reads
         )
 
     def _known(self) -> set[str]:

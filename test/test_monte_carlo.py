@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from test_commands import failure, output
+from test_commands import call, failure, output
 
 from sbs_sim import Case, simulate, simulate_batch
 from sbs_sim.analysis.export import to_json
@@ -137,6 +137,16 @@ def test_the_command_prints_percentiles_and_writes_files(tmp_path):
     assert len((tmp_path / "b.csv").read_text().splitlines()) == 5
     assert lines[-2:] == [f"written: {tmp_path / 'batch'}.{kind}" for kind in ("png", "svg")]
     assert (tmp_path / "batch.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_flights_of_which_none_begins_are_told_with_their_reasons(tmp_path):
+    table, file = tmp_path / "a.csv", tmp_path / "a.json"
+    ended = call("batch", "--flights", 2, "--duration", 0.1, "--airspeed", 99, "--csv", table, "--json", file)
+    assert ended.returncode == 1
+    assert ended.stderr == "no flight came to its end\n"
+    assert ended.stdout.count("no trim") == 2
+    assert table.read_text().count("no trim") == 2
+    assert all("no trim" in flight["error"] for flight in json.loads(file.read_text())["flights"])
 
 
 def test_the_command_tells_what_is_wrong_in_one_line():

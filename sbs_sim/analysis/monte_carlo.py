@@ -114,7 +114,7 @@ def quantities(batch: Batch) -> dict[str, Array]:
     attitude = batch["state"][:, :, S.ATTITUDE : S.ATTITUDE + 4]
     flown = ~np.isnan(attitude[:, :, 0])
     angles = np.full((*flown.shape, 3), math.nan)
-    angles[flown] = [quaternion_to_euler(quaternion) for quaternion in attitude[flown]]
+    angles[flown] = np.reshape([quaternion_to_euler(quaternion) for quaternion in attitude[flown]], (-1, 3))
     angles[:, :, ::2] = np.unwrap(angles[:, :, ::2], axis=1)  # yaw and roll, over 180 deg
     named = {f"{name} [deg]": np.degrees(angles[:, :, k]) for name, k in (("roll", 2), ("pitch", 1), ("yaw", 0))}
     power = np.where(flown, np.nansum(batch["power"], axis=2), math.nan)

@@ -8,7 +8,6 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
@@ -28,8 +27,6 @@ from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES, StateLayout
 Array = NDArray[np.float64]
 Range = tuple[float, float]
 NOT_PHYSICS = ("name", "airfoil", "collective_range", "cyclic_range", "swashplate_rate")  # of a rotor, for the model
-
-MOST_VALUES = 10_000  # of a file; aliases of aliases make billions of a few lines
 
 
 @dataclass(frozen=True)
@@ -225,7 +222,6 @@ class Aircraft:
     @classmethod
     def _made_of(cls, data: Any, folder: Path, similar: "Aircraft | None" = None) -> "Aircraft":
         """Checked aircraft of a mapping, with the airfoil tables of a similar one where they are the same."""
-        _check_size(data)
         _check_schema(data)
         data = separate(data)
         rotors = tuple(_rotor(entry) for entry in data["rotors"])
@@ -463,36 +459,8 @@ def _validator() -> Any:
     return Draft202012Validator(_schema())
 
 
-def _check_size(data: Any) -> None:
-    """Raise AircraftError for more values than any aircraft has, before anything goes through all of them."""
-    try:
-        size = _size(data, {})
-    except RecursionError:
-        raise AircraftError("the file is nested too deeply") from None
-    if size > MOST_VALUES:
-        raise AircraftError(
-            f"the file has {size} values, aliases counted as what they stand for: allowed are {MOST_VALUES}"
-        )
-
-
-def _size(node: Any, known: dict[int, int]) -> int:
-    """Number of values in nested mappings and lists; what contains itself counts once."""
-    if isinstance(node, Mapping):
-        parts = [*node.keys(), *node.values()]
-    elif isinstance(node, list | tuple | set | frozenset):
-        parts = list(node)
-    elif isinstance(node, complex | np.ndarray):  # the schema cannot even compare them
-        raise AircraftError(f"{checks.shown(node)}: allowed are numbers, texts, lists and mappings")
-    else:  # Python cannot even print a number of thousands of digits
-        return 1 + node.bit_length() if isinstance(node, int) else 1
-    if id(node) not in known:
-        known[id(node)] = 0
-        known[id(node)] = 1 + sum(_size(part, known) for part in parts)
-    return known[id(node)]
-
-
 def _check_schema(data: Any) -> None:
-    """Raise AircraftError with all that is wrong with keys, types and plain ranges."""
+    """Raise AircraftError with all that is wrong with size, keys, types and plain ranges."""
     problems = config_file.problems(data, _validator())
     if problems:
         raise AircraftError("; ".join(problems))

@@ -3,6 +3,7 @@
 Every flight is what `simulate` would give, to the last bit, whatever number of threads or workers fly them.
 """
 
+import inspect
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint, trim
 from sbs_sim.errors import BatchError, SbsError
@@ -29,8 +31,10 @@ Array = NDArray[np.float64]
 LOADED = ("acceleration", "thrust", "torque", "power")  # which take a derivative at every row
 GROUPS = ("state", "controls", "swashplate", *LOADED)
 FIDELITY = ("lead_lag", "cyclic_inflow")
+TRIM_ARGUMENTS = tuple(list(inspect.signature(trim).parameters)[1:])  # but the aircraft
 CANCELLED = "cancelled"
 MEMORY = 4e9  # bytes
+MOST_TICKS = 10**10  # of the longest flight with the shortest tick
 
 
 @dataclass(frozen=True)
@@ -182,8 +186,9 @@ def simulate_batch(
     """
     plan = _plan(cases, duration, every, outputs, {"tick": tick, **options})
     count = checked_workers(workers, dask, BatchError)
-    rows = round(duration / tick) // every + 1
+    rows = round(plan.duration / plan.options["tick"]) // plan.every + 1
     names = tuple(dict.fromkeys(name for case in cases for name in case.aircraft.layout.names))
+    memory = checks.number("memory", memory, 0.0, 1e15, "bytes", BatchError)
     histories = _memory(cases, plan.outputs, rows, names, memory)
     errors: list[str | None] = [CANCELLED] * len(cases)
     done = itertools.count(1)
@@ -196,28 +201,37 @@ def simulate_batch(
 
     calls = [(case.aircraft, case.start, case.controls, case.wind, dict(case.changes), plan) for case in cases]
     compute(_fly, calls, keep, workers=count, cancelled=cancelled, dask=dask)
-    return Batch(tuple(cases), np.multiply(np.arange(rows) * every, tick, dtype=float), names, histories, tuple(errors))
+    time = np.multiply(np.arange(rows) * plan.every, plan.options["tick"], dtype=float)
+    return Batch(tuple(cases), time, names, histories, tuple(errors))
 
 
 def _plan(cases: Sequence[Case], duration: float, every: int, outputs: Sequence[str], options: dict[str, Any]) -> Plan:
     """What the flights have in common, checked as far as it can be without an aircraft."""
-    if not cases:
-        raise BatchError("cases: allowed is at least one flight")
-    if not 0.0 <= duration <= 1e6:
-        raise BatchError(f"duration = {duration}: allowed are 0 to 1e+06 s")
-    if not 1e-4 <= options["tick"] <= 1.0:
-        raise BatchError(f"tick = {options['tick']}: allowed are 0.0001 to 1 s")
-    if isinstance(every, bool) or not isinstance(every, int) or every < 1:
-        raise BatchError(f"every = {every!r}: allowed are whole numbers from 1")
+    _check_cases(cases)
+    duration = checks.number("duration", duration, 0.0, 1e6, "s", BatchError)
+    options["tick"] = checks.number("tick", options["tick"], 1e-4, 1.0, "s", BatchError)
+    every = checks.whole("every", every, 1, MOST_TICKS, BatchError)
     allowed = ("tick", "azimuth_step", "method", "ground_altitude", *FIDELITY)
     unknown = [name for name in options if name not in allowed]
     if unknown:
         raise BatchError(f"{unknown[0]}: unknown option, allowed are {', '.join(allowed)}")
     known = {*GROUPS, *(name for case in cases for name in case.aircraft.layout.names)}
+    checks.instance("outputs", outputs, Sequence, BatchError)
     for name in outputs:
-        if name not in known:
-            raise BatchError(f"outputs: {name!r}: allowed are {', '.join(GROUPS)} and names of states")
+        if not (isinstance(name, str) and name in known):
+            raise BatchError(f"outputs: {checks.shown(name)}: allowed are {', '.join(GROUPS)} and names of states")
     return Plan(duration, every, tuple(dict.fromkeys(outputs)), options)
+
+
+def _check_cases(cases: Any) -> None:
+    """Raise BatchError for what is no sequence of flights, and for what no flight can be made of."""
+    checks.instance("cases", cases, Sequence, BatchError)
+    if not len(cases):
+        raise BatchError("cases: allowed is at least one flight")
+    for i, case in enumerate(cases):
+        checks.instance(f"cases[{i}]", case, Case, BatchError)
+        for name, kind in (("aircraft", Aircraft), ("wind", Wind), ("changes", Mapping)):
+            checks.instance(f"cases[{i}].{name}", getattr(case, name), kind, BatchError)
 
 
 def _memory(
@@ -271,6 +285,9 @@ def _fly(
         if aircraft.layout != layout:
             raise BatchError(f"changes = {changes}: allowed are those that leave the states as they are")
         if isinstance(start, Mapping):
+            if unknown := [name for name in start if name not in TRIM_ARGUMENTS]:
+                name = checks.shown(unknown[0])
+                raise BatchError(f"start: {name}: unknown, allowed are {', '.join(TRIM_ARGUMENTS)}")
             fidelity = {name: plan.options[name] for name in FIDELITY if name in plan.options}
             start = trim(aircraft, **{**fidelity, **start})
         if controls is None:

@@ -1,13 +1,17 @@
 """Configuration files: YAML that a JSON schema describes, and what is wrong with one in words."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from sbs_sim import checks
 from sbs_sim.errors import SbsError
 
 LARGEST_FILE = 1 << 18  # bytes; an aircraft with 16 rotors has 20 000
+MOST_VALUES = 10_000  # of a file; aliases of aliases make billions of a few lines
 TYPE_WORDS = {
     "number": "a number",
     "integer": "a whole number",
@@ -44,7 +48,7 @@ def read_yaml(path: Path) -> Any:
 
 
 def problems(data: Any, validator: Any) -> list[str]:
-    """All that is wrong with keys, types and plain ranges, each as "path = value: what is allowed".
+    """All that is wrong with size, keys, types and plain ranges, each as "path = value: what is allowed".
 
     Parameters
     ----------
@@ -52,12 +56,43 @@ def problems(data: Any, validator: Any) -> list[str]:
         As read from YAML.
     validator : jsonschema validator
     """
+    if too_much := _too_much(data):  # before anything goes through all of it
+        return [too_much]
     errors = sorted(validator.iter_errors(data), key=lambda error: list(map(str, error.path)))
     # only data that the schema accepts have a structure that is known, in which the search comes to an end
     found = [_explain(error) for error in errors] or [
         f"{path} = {value}: allowed is a finite number" for path, value in _not_finite(data, "")
     ]
     return list(dict.fromkeys(found))
+
+
+def _too_much(data: Any) -> str:
+    """What to say of more values than any configuration has, or of such as the schema cannot even compare."""
+    try:
+        size = _size(data, {})
+    except RecursionError:
+        return "the file is nested too deeply"
+    except TypeError as error:
+        return str(error)
+    if size <= MOST_VALUES:
+        return ""
+    return f"the file has {size} values, aliases counted as what they stand for: allowed are {MOST_VALUES}"
+
+
+def _size(node: Any, known: dict[int, int]) -> int:
+    """Number of values in nested mappings and lists; what contains itself counts once."""
+    if isinstance(node, Mapping):
+        parts = [*node.keys(), *node.values()]
+    elif isinstance(node, list | tuple | set | frozenset):
+        parts = list(node)
+    elif isinstance(node, complex | np.ndarray):
+        raise TypeError(f"{checks.shown(node)}: allowed are numbers, texts, lists and mappings")
+    else:  # Python cannot even print a number of thousands of digits
+        return 1 + node.bit_length() if isinstance(node, int) else 1
+    if id(node) not in known:
+        known[id(node)] = 0
+        known[id(node)] = 1 + sum(_size(part, known) for part in parts)
+    return known[id(node)]
 
 
 def _not_finite(data: Any, path: str) -> list[tuple[str, float]]:

@@ -25,17 +25,25 @@ from ruamel.yaml import YAML
 
 from sbs_sim import Aircraft, Simulation, linearize, simulate, sweep, trim
 from sbs_sim.aircraft import config_folder
+from sbs_sim.analysis.export import save
+from sbs_sim.analysis.monte_carlo import gust_cases
 from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim.batch import Case, simulate_batch
+from sbs_sim.cockpit.playback import Recording
 from sbs_sim.errors import SbsError
 from sbs_sim.mixer import Mixer
 from sbs_sim.model.airfoil import read_table
 from sbs_sim.model.wind import Wind
+from sbs_sim.pilot.augmentation import StickPilot, augmentation
+from sbs_sim.pilot.flight import fly
+from sbs_sim.pilot.hover_hold import LIMITS, HoverHold, HoverModel, design
+from sbs_sim.pilot.joystick import Joystick, JoystickFile
 from sbs_sim.recording import LogWriter, qos_profiles, read, recover
 from sbs_sim.recording.flight import flight_of, verify
 from sbs_sim.recording.plot import plot
 
 BAG = Path(__file__).resolve().parents[1] / "bags" / "hover_step.mcap"
-COMMANDS = ("trim", "linearize", "sweep", "plot")
+COMMANDS = ("trim", "linearize", "sweep", "batch", "gusts", "plot")
 
 
 @dataclass(frozen=True)
@@ -99,6 +107,17 @@ ANYTHING = st.recursive(
 def mostly(good: Any, bad: Any = ANYTHING) -> Any:
     """Something right in most cases, so that the others are reached."""
     return st.integers(0, 5).flatmap(lambda k: bad if k == 0 else st.just(good))
+
+
+def _is_long(value: Any) -> bool:
+    """True for what may be right and takes minutes."""
+    try:
+        return bool(0.1 < value < 1e7)
+    except Exception:
+        return False
+
+
+SHORT = ANYTHING.filter(lambda value: not _is_long(value))
 
 
 @contextlib.contextmanager
@@ -256,7 +275,7 @@ SIMULATIONS = st.fixed_dictionaries(
         | st.just(HOVER.swashplate)
         | st.lists(NUMBERS, min_size=4, max_size=4)
         | ANYTHING,
-        "duration": mostly(0.02, st.floats(max_value=0.1) | ANYTHING),
+        "duration": mostly(0.02, st.floats(max_value=0.1) | SHORT),
     },
     optional={
         "tick": mostly(0.01),
@@ -333,6 +352,184 @@ def _paths(node: Any, path: str = "") -> Iterator[str]:
 
 PATHS = st.sampled_from([*_paths(SBS.data), "rotors.radius", "rotors.MR1.hub"])
 VALUES = st.tuples(PATHS | PATHS.map(lambda path: path[:-1]) | ANYTHING, ANYTHING)
+
+
+def check_export(given: tuple[Any, Any]) -> None:
+    """A linear model into a file of any name; whole, or not at all."""
+    model, path = given
+    with scratch() as folder:
+        with refusing():
+            save(model, path)
+            assert (folder / path).stat().st_size > 1000
+        assert not [name for name in os.listdir(folder) if name.startswith(".")], "something was left beside the file"
+
+
+EXPORTS = st.deferred(
+    lambda: st.tuples(mostly(HOVER_MODEL), st.sampled_from(["a.npz", "a.mat", "b.JSON"]) | TARGETS | ANYTHING)
+)
+
+
+def check_batch(given: dict[str, Any]) -> None:
+    """Many flights with anything for any argument; a flight that fails says why and disturbs no other."""
+    with refusing():
+        batch = simulate_batch(given["cases"], given["duration"], **given["options"])
+        assert len(batch.errors) == len(given["cases"])
+        assert all(error is None or len(error.splitlines()) == 1 for error in batch.errors)
+        for values in batch.histories.values():
+            assert not np.isinf(values).any()
+            whole = [i for i, error in enumerate(batch.errors) if error is None]
+            assert np.isfinite(values[whole]).all()
+
+
+# Of nobody, and on this machine: nothing here may look up names elsewhere.
+ADDRESSES = st.sampled_from(["", "x", "tcp://127.0.0.1:1", "127.0.0.1", "tcp://127.0.0.1:99999", "a\0b", "http://", 5])
+
+
+CASES = st.builds(
+    lambda given: Case(**given),
+    st.fixed_dictionaries(
+        {
+            "aircraft": mostly(SBS),
+            "start": st.just(HOVER) | st.sampled_from([{"airspeed": 3.0}, {"speed": 3.0}, {}]) | STATES | ANYTHING,
+        },
+        optional={
+            "controls": mostly(HOVER.controls, st.lists(NUMBERS, min_size=4, max_size=4) | ANYTHING),
+            "wind": mostly(Wind()),
+            "changes": mostly({}, st.dictionaries(PATHS, SCALARS, max_size=2) | ANYTHING),
+        },
+    ),
+)
+BATCHES = st.fixed_dictionaries(
+    {
+        "cases": st.lists(CASES, max_size=3) | mostly([Case(SBS, HOVER)]),
+        "duration": mostly(0.02, st.floats(max_value=0.1) | SHORT),
+        "options": st.fixed_dictionaries(
+            {},
+            optional={
+                "every": mostly(1),
+                "outputs": mostly(("state", "power"), st.lists(TEXTS, max_size=2) | ANYTHING),
+                "tick": mostly(0.01, SHORT),
+                "azimuth_step": mostly(0.08),
+                "lead_lag": mostly(True),
+                "method": mostly("rk4"),
+                "workers": mostly(2),
+                "memory": mostly(1e9),
+                "dask": st.none() | ADDRESSES,
+                "unknown": ANYTHING,
+            },
+        ),
+    }
+)
+
+
+def check_gust_cases(given: dict[str, Any]) -> None:
+    """Flights through turbulence, as the command `batch` plans them."""
+    given = dict(given)
+    with refusing():
+        cases = gust_cases(given.pop("aircraft"), given.pop("flights"), given.pop("condition"), **given)
+        assert all(math.isfinite(value) for case in cases for value in case.changes.values())
+
+
+GUST_CASES = st.fixed_dictionaries(
+    {
+        "aircraft": mostly(SBS),
+        "flights": mostly(2, st.sampled_from([0, -1, 3, 10**9]) | SHORT),
+        "condition": mostly({}, st.dictionaries(st.just("airspeed"), NUMBERS | ANYTHING, max_size=1) | ANYTHING),
+        "turbulence": mostly(1.5, NUMBERS | ANYTHING),
+    },
+    optional={
+        "length": NUMBERS | ANYTHING,
+        "seed": st.integers() | ANYTHING,
+        "spread": st.dictionaries(PATHS | TEXTS, st.just(0.05) | SCALARS, max_size=2) | ANYTHING,
+    },
+)
+
+
+# --- pilots -----------------------------------------------------------------------------------------------------
+
+HOVER_MODEL = linearize(SBS, azimuth_count=4)
+DESIGN = design(HoverModel.of(HOVER_MODEL))
+STICKS = augmentation(HOVER_MODEL)
+
+
+def check_pilot(given: dict[str, Any]) -> None:
+    """Hover hold and sticks: any limits, targets, times and states; the controls are finite, or refused."""
+    with refusing():
+        assert design(HoverModel.of(HOVER_MODEL), given["limits"]).is_stable
+    pilots = HoverHold(DESIGN), StickPilot(STICKS, [0.05] * 4)
+    for time, body, position, heading in given["moves"]:
+        with refusing():
+            pilots[0].hold(position, heading)
+        for pilot in pilots:
+            with refusing():
+                assert np.isfinite(pilot.controls(time, body)).all()
+            assert np.isfinite(pilot.controls(1.0, START)).all(), "what was refused has changed something"
+
+
+BODIES = STATES | st.lists(NUMBERS, min_size=13, max_size=13) | ANYTHING
+PILOTS = st.fixed_dictionaries(
+    {
+        "limits": mostly(None, st.dictionaries(st.sampled_from([*LIMITS, "x"]), SCALARS, max_size=2) | ANYTHING),
+        "moves": st.lists(
+            st.tuples(
+                NUMBERS | ANYTHING, BODIES, st.lists(NUMBERS, min_size=3, max_size=3) | ANYTHING, NUMBERS | ANYTHING
+            ),
+            max_size=3,
+        ),
+    }
+)
+
+
+def check_pilot_flight(given: dict[str, Any]) -> None:
+    """A flight with a pilot who gives anything."""
+    answers = iter(given["answers"])
+    with refusing():
+        flight = fly(
+            given["aircraft"],
+            given["start"],
+            lambda time, state: next(answers, HOVER.controls),
+            given["duration"],
+            **given["options"],
+        )
+        assert np.isfinite(flight["controls"]).all()
+
+
+PILOT_FLIGHTS = st.fixed_dictionaries(
+    {
+        "aircraft": mostly(SBS),
+        "start": st.just(HOVER) | st.just(START) | STATES | ANYTHING,
+        "answers": st.lists(st.just(HOVER.controls) | CONTROLS | ANYTHING, max_size=3),
+        "duration": mostly(0.02, st.floats(max_value=0.1) | SHORT),
+        "options": st.fixed_dictionaries({}, optional={"wind": mostly(Wind()), "delay": mostly(1), "tick": SHORT}),
+    }
+)
+
+
+def check_joystick(given: dict[str, Any]) -> None:
+    """A joystick file, and messages of any axes and buttons; what is read is finite."""
+    with scratch() as folder:
+        (folder / "a.yaml").write_bytes(given["file"])
+        with refusing():
+            joystick = Joystick(JoystickFile.load(str(folder / "a.yaml"), given["pad"]))
+            for axes, buttons in given["messages"]:
+                with refusing():
+                    reading = joystick.read(axes, buttons)
+                    assert np.abs(reading.sticks).max() <= 1.0
+                    assert np.abs(reading.trim).max() <= 1.0
+
+
+JOYSTICK = (config_folder() / "joystick.yaml").read_bytes()
+JOYSTICKS = st.deferred(
+    lambda: st.fixed_dictionaries(
+        {
+            "file": st.just(JOYSTICK) | mutated([JOYSTICK], PIECES),
+            "pad": mostly("xbox", st.sampled_from(["gamepad", "transmitter"]) | TEXTS),
+            "messages": st.lists(
+                st.tuples(st.lists(NUMBERS, max_size=8), st.lists(st.integers(-1, 2), max_size=12)), max_size=3
+            ),
+        }
+    )
+)
 
 
 # --- files ------------------------------------------------------------------------------------------------------
@@ -504,6 +701,11 @@ def use_log(path: Path, draw: bool) -> None:
                 plot(log, path.with_suffix(".svg"))
         with refusing():
             verify(flight_of(log))
+    with refusing():
+        recording = Recording(path)  # as the cockpit shows it
+        for time in (-1.0, recording.beginning, 0.5 * recording.end, 1e9):
+            snapshot = recording.at(time)
+            assert snapshot.loads.shape[0] == len(recording.aircraft.rotors)
 
 
 def check_foreign(given: dict[str, Any]) -> None:
@@ -662,7 +864,36 @@ OPTIONS["sweep"] = {
     "--csv": TARGETS,
     "--values": WORDS,
 }
+OPTIONS["batch"] = {
+    **OPTIONS["trim"],
+    "--flights": st.sampled_from(["1", "2", "0", "-1", "x", "99999999999"]),
+    "--duration": st.sampled_from(["0.05", "0", "-1", "nan", "1e9"]) | WORDS.filter(lambda text: text != "15"),
+    **dict.fromkeys(("--turbulence", "--length", "--seed"), st.sampled_from(["0", "1", "-1", "1e9"]) | WORDS),
+    "--spread": st.sampled_from(["body.mass=0.05", "body.mass=2", "name=0.1", "rotors=0.1", "x"]) | WORDS,
+    "--every": st.sampled_from(["0.1", "0", "1e9", "nan"]) | WORDS,
+    "--workers": OPTIONS["sweep"]["--workers"],
+    "--dask": ADDRESSES.map(str),
+    "--csv": TARGETS,
+}
+OPTIONS["gusts"] = {
+    "--aircraft": OPTIONS["trim"]["--aircraft"],
+    "--set": OPTIONS["trim"]["--set"],
+    **dict.fromkeys(
+        ("--wind", "--turbulence", "--length", "--gust", "--gust-duration"),
+        st.sampled_from(["0", "101", "-1e9"]) | WORDS,
+    ),
+    "--seed": st.sampled_from(["0", "-1", "1e9", "99999999999999999999"]) | WORDS,
+    "--duration": st.sampled_from(["1", "0", "1e9", "nan"]),
+    "--delay": st.sampled_from(["1", "-1", "101", "x"]),
+    "--limit": st.sampled_from(
+        ["forward=0.3", "forward=0", "forward=1e-300", "heading=1e300", "x=1", "u", "=", "u=nan"]
+    ),
+    "--json": TARGETS,
+}
+SHORT_BATCH = ["--flights", "2", "--duration", "0.05", "--azimuth-count", "2"]
 POSITIONALS = {
+    "batch": st.sampled_from([[], ["x"], ["--every", "0"], ["--spread", "name=1"]]).map(SHORT_BATCH.__add__),
+    "gusts": st.sampled_from([["x"], ["--delay", "-1"], ["--limit", "forward=0"], ["--seed", "-1"]]),
     "trim": st.just([]) | st.lists(WORDS, max_size=1),
     "linearize": st.just([]) | st.lists(WORDS, max_size=1),
     "sweep": st.sampled_from(
@@ -686,6 +917,8 @@ def command_lines(draw: Any) -> tuple[str, list[str]]:
     name = draw(st.sampled_from(COMMANDS))
     words = list(draw(POSITIONALS[name]))
     for option in draw(st.lists(st.sampled_from(sorted(OPTIONS[name])), max_size=3)):
+        if name == "gusts" and option == words[0]:
+            continue  # a right one would fly for seconds
         value = OPTIONS[name][option]
         words += [option] if value is None else [option, draw(value)]
     return name, words
@@ -734,6 +967,12 @@ DOORS = (
     Door("Wind", WINDS, check_wind, 2.0),
     Door("Mixer", MOVES, check_mixer, 2.0),
     Door("with_value", VALUES, check_value, 2.0),
+    Door("simulate_batch", BATCHES, check_batch, 2.0),
+    Door("gust_cases", GUST_CASES, check_gust_cases, 1.0),
+    Door("save", EXPORTS, check_export, 1.0),
+    Door("hover hold, sticks", PILOTS, check_pilot, 0.5),
+    Door("pilot.flight.fly", PILOT_FLIGHTS, check_pilot_flight, 1.0),
+    Door("joystick file, axes", JOYSTICKS, check_joystick, 2.0),
     Door("aircraft file, bytes", mutated(YAML_TEXTS, PIECES), check_yaml, 2.0),
     Door("aircraft file, values", st.lists(st.tuples(PATHS, ANYTHING), max_size=3), check_yaml_values, 2.0),
     Door("airfoil file", mutated([AIRFOIL, _small_airfoil(), _small_airfoil()], CSV_PIECES), check_airfoil, 2.0),

@@ -4,28 +4,48 @@ import contextlib
 import math
 import os
 import signal
+import socket
 import time
+import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import psutil
 import rclpy
+import viser
+import zstandard
 from doors import EXTREMES, Door
+from geometry_msgs.msg import PoseStamped
 from hypothesis import strategies as st
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from ros_harness import PATIENCE, Process
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_harness import PATIENCE, Process, Terminal, World
+from sensor_msgs.msg import Joy
 from std_srvs.srv import SetBool
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
 
 from sbs_msgs.action import Sweep
-from sbs_msgs.msg import BodyState, Controls, SimulationStatus, SwashplateArray
+from sbs_msgs.msg import (
+    BodyState,
+    Controls,
+    FlightEvent,
+    InflowArray,
+    LinearModel,
+    RotorStateArray,
+    SimulationStatus,
+    SwashplateArray,
+)
 from sbs_msgs.srv import Linearize, Reset, SetWind, Step, Trim
+from sbs_sim.model.state import CONTROL_NAMES
 
 SERVICES = {
     "pause": SetBool,
@@ -224,6 +244,218 @@ class Live:
         self._sweeps.destroy()
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
+
+
+# --- pilots and cockpit -----------------------------------------------------------------------------------------
+
+HEARD = {
+    "state": BodyState,
+    "events": FlightEvent,
+    "status": SimulationStatus,
+    "target": PoseStamped,
+    "joy": Joy,
+    "rotors": RotorStateArray,
+    "inflow": InflowArray,
+    "linear_model": LinearModel,
+}
+PILOTS = ("hover_hold", "joystick", "teleop")
+ENDING_KEYS = b"q\x03\x04\x1a\x1c"  # and those that a terminal makes signals of
+
+
+class Pilots:
+    """Pilots and a cockpit beside a flight that hear nothing but nonsense, on topics of their own.
+
+    Parameters
+    ----------
+    made : World
+        With a simulator that flies.
+    """
+
+    def __init__(self, made: World) -> None:
+        self._client, self._folder = made.client, made.folder
+        own = [f"{name}:=nonsense/{name}" for name in HEARD]
+        self.parts: dict[str, Any] = {
+            name: made.start(name, remaps=[*own, f"controls:=nonsense/{name}"]) for name in PILOTS[:-1]
+        }
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self.port = free.getsockname()[1]
+        arguments = ["--attach", "--port", str(self.port)]
+        self.parts["cockpit"] = made.start("cockpit", remaps=own, arguments=arguments)
+        words = [word for remap in [*own, "controls:=nonsense/teleop"] for word in ("-r", remap)]
+        self.parts["teleop"] = Terminal(made.domain, made.folder, *words)
+        latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._outputs = {
+            name: made.client.node.create_publisher(kind, f"nonsense/{name}", latched) for name, kind in HEARD.items()
+        }
+        self._given = {name: made.client.watch(f"nonsense/{name}", Controls) for name in PILOTS}
+        self._time = 0
+        made.client.until(lambda: all(output.get_subscription_count() for output in self._outputs.values()), "pilots")
+        made.client.until(lambda: served(self.port), "the page")
+        self.check_alive()
+
+    def check_message(self, given: tuple[str, Any]) -> None:
+        """A message of any kind; nobody ends, and nobody commands what is not finite."""
+        name, message = given
+        self._outputs[name].publish(message)
+        self._client.spin(0.002)
+        self.check_running()
+
+    def check_keys(self, keys: bytes) -> None:
+        """Keys of any kind."""
+        self.parts["teleop"].type(bytes(key for key in keys if key not in ENDING_KEYS).decode("latin-1"))
+        self.check_running()
+
+    def check_running(self) -> None:
+        """All are there and have said nothing of errors of their own."""
+        for name, part in self.parts.items():
+            assert part.running, f"{name} has ended:\n{part.output[-2000:]}"
+        for name, messages in self._given.items():
+            values = [getattr(message, field) for message in messages for field in CONTROL_NAMES]
+            assert all(map(math.isfinite, values)), f"{name} commands {values}"
+            messages.clear()
+
+    def check_alive(self) -> None:
+        """After all, those of a sound flight are answered again by every pilot, and the page is served."""
+        start = FlightEvent(kind=FlightEvent.START, swashplate=[0.1] * 6, state=[0.0] * 3 + [1.0] + [0.0] * 39)
+        self._outputs["events"].publish(start)
+        for messages in self._given.values():
+            messages.clear()
+
+        def answered() -> bool:
+            self._time += 1
+            state = BodyState()
+            state.header.stamp.sec, state.header.stamp.nanosec = divmod(self._time * 10_000_000, 10**9)
+            self._outputs["state"].publish(state)
+            self._outputs["joy"].publish(Joy(axes=[0.0] * 8, buttons=[0] * 16))
+            return all(self._given.values())
+
+        with contextlib.suppress(AssertionError):
+            self._client.until(answered, "every pilot")
+        silent = [name for name, messages in self._given.items() if not messages]
+        assert not silent, f"{silent} do not answer: {[self.parts[name].output[-1500:] for name in silent]}"
+        self.check_running()
+        assert served(self.port)
+        for name, part in self.parts.items():
+            assert "internal error" not in part.output, f"{name}:\n{part.output[-3000:]}"
+            if name in PILOTS:  # the page's server prints what it could not make of a client's messages
+                assert "Traceback" not in part.output, f"{name}:\n{part.output[-3000:]}"
+
+    def doors(self) -> tuple[Door, ...]:
+        """The doors of the pilots, and of the cockpit to messages."""
+        kinds = [st.tuples(st.just(name), messages(kind, 4)) for name, kind in HEARD.items()]
+        raw = st.tuples(st.sampled_from(sorted(HEARD)), st.binary(max_size=200) | CDR)
+        return (
+            Door("messages to pilots, page", st.one_of(*kinds), self.check_message, 3.0),
+            Door("raw CDR to pilots, page", raw, self.check_message, 2.0),
+            Door("keys of teleop", st.binary(max_size=20), self.check_keys, 1.0),
+        )
+
+    def close(self) -> None:
+        """End the one that the world does not know of."""
+        self.parts["teleop"].close()
+
+
+def served(port: int) -> bool:
+    """True if the page of the cockpit is there."""
+    with contextlib.suppress(OSError), urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=5.0) as answer:
+        return bool(answer.status == 200)
+    return False
+
+
+class Page:
+    """What a client can send to the page of a cockpit that flies: HTTP, WebSocket, anything.
+
+    Parameters
+    ----------
+    port : int
+    running : callable
+        False once the cockpit has ended.
+    """
+
+    def __init__(self, port: int, running: Callable[[], bool]) -> None:
+        self._port, self._running = port, running
+        self._socket = self.connect()
+        self._parts = sorted(self._known())
+
+    def connect(self, **headers: str) -> Any:
+        """A connection like that of the page."""
+        return connect(
+            f"ws://127.0.0.1:{self._port}",
+            subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
+            additional_headers=headers,
+            max_size=None,
+            ping_interval=None,  # while the other doors have their turn nobody reads
+        )
+
+    def _known(self) -> set[str]:
+        """Names of all that can be pressed or moved, from what a new page is told."""
+        found: set[str] = set()
+        end = time.monotonic() + 3.0
+        while time.monotonic() < end:
+            with contextlib.suppress(TimeoutError):
+                data = self._socket.recv(timeout=0.5)
+                size = int.from_bytes(data[8:16], "little")
+                told = msgspec.msgpack.decode(zstandard.decompress(data[16 : 16 + size]))
+                found |= {item["uuid"] for item in told["messages"] if "uuid" in item}
+        return found
+
+    def check_request(self, data: bytes) -> None:
+        """Bytes of any kind, some of them HTTP."""
+        with socket.create_connection(("127.0.0.1", self._port), 5.0) as client:
+            client.sendall(data)
+            client.shutdown(socket.SHUT_WR)
+            client.settimeout(5.0)
+            answer = b""
+            with contextlib.suppress(OSError):
+                while part := client.recv(65536):
+                    answer += part
+        assert b"root:" not in answer
+        self.check_alive()
+
+    def check_press(self, given: tuple[int, str, Any]) -> None:
+        """What a page sends, with nonsense in it."""
+        place, kind, value = given
+        part = self._parts[place % len(self._parts)]
+        message: Any = {"type": kind, "uuid": part, "updates": {"value": value}}
+        if kind == "raw":
+            data = value if isinstance(value, bytes) else b""
+        else:
+            data = msgspec.msgpack.encode(message if kind == "GuiUpdateMessage" else {"type": kind, "uuid": part})
+        try:
+            self._socket.send(data)
+            with contextlib.suppress(TimeoutError):
+                while self._socket.recv(timeout=0.0):
+                    pass
+        except ConnectionClosed:  # what cannot be read closes the connection, of this page alone
+            self._socket = self.connect()
+        self.check_alive()
+
+    def check_alive(self) -> None:
+        """The cockpit is there and serves others."""
+        assert self._running(), "the cockpit has ended"
+        assert served(self._port)
+
+    def doors(self) -> tuple[Door, ...]:
+        """The doors of the page."""
+        paths = st.sampled_from(
+            [b"/", b"/../../../../etc/passwd", b"/%2e%2e/%2e%2e/etc/passwd", b"//etc/passwd", b"/\\.."]
+        )
+        http = st.builds(
+            lambda method, path, rest: method + b" " + path + b" HTTP/1.1\r\nHost: x\r\n" + rest + b"\r\n\r\n",
+            st.sampled_from([b"GET", b"POST", b"X" * 9000]),
+            paths | st.binary(max_size=30),
+            st.sampled_from([b"", b"Upgrade: websocket", b"Content-Length: 99999999999"]) | st.binary(max_size=50),
+        )
+        kinds = st.sampled_from(["GuiUpdateMessage"] * 4 + ["CommandTriggerMessage", "NoSuchMessage", "raw"])
+        plain = st.none() | st.booleans() | NUMBERS | WORDS | st.binary(max_size=30) | st.lists(NUMBERS, max_size=3)
+        return (
+            Door("requests to the page", http | st.binary(max_size=200), self.check_request, 1.0),
+            Door("presses on the page", st.tuples(st.integers(0, 200), kinds, plain), self.check_press, 1.0),
+        )
+
+    def close(self) -> None:
+        """Leave."""
+        self._socket.close()
 
 
 CDR = st.builds(

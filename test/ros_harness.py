@@ -4,10 +4,14 @@ import collections
 import contextlib
 import fcntl
 import os
+import pty
+import select
 import signal
 import subprocess
 import sys
 import tempfile
+import termios
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -22,10 +26,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
+from sbs_sim.nodes.host import keep_to_this_machine
 
 EXECUTABLES = Path(__file__).resolve().parent.parent / "install" / "sbs_sim" / "lib" / "sbs_sim"
 LAST_DOMAIN = 101  # the ports of later ones are those that Linux gives to anybody
 HELD_DOMAINS = 25
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+keep_to_this_machine()
 PATIENCE = 30.0  # s of wall time; generous, for machines that are busy
 
 
@@ -61,7 +68,7 @@ DOMAINS = _domains()
 
 def environment(domain: int, folder: Path | None = None) -> dict[str, str]:
     """Environment of a process in a DDS domain of its own on this machine, its logs in a folder."""
-    own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    own = {"ROS_DOMAIN_ID": str(domain)}
     return {**os.environ, **own, **({"SBS_SIM_BAGS": str(folder / "bags")} if folder else {})}
 
 
@@ -117,6 +124,73 @@ class Process:
     def kill(self) -> None:
         """End it whatever it does."""
         if self.running:
+            self._popen.kill()
+            self._popen.wait(PATIENCE)
+
+
+class Terminal:
+    """The executable `teleop` in a terminal of its own."""
+
+    def __init__(self, domain: int, folder: Path, *arguments: str) -> None:
+        self._user, self._side = pty.openpty()
+        self.before = termios.tcgetattr(self._side)
+        side = self._side
+        self._popen = subprocess.Popen(
+            [sys.executable, str(EXECUTABLES / "teleop"), "--ros-args", *arguments],
+            stdin=side,
+            stdout=side,
+            stderr=side,
+            env=environment(domain, folder),
+            start_new_session=True,
+            preexec_fn=lambda: fcntl.ioctl(side, termios.TIOCSCTTY, 0),  # so that Ctrl-C comes from it
+        )
+        self.output = ""
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                if select.select([self._user], [], [], 0.1)[0]:
+                    self.output += os.read(self._user, 4096).decode(errors="replace")
+
+    def type(self, keys: str) -> None:
+        """Type keys."""
+        os.write(self._user, keys.encode())
+
+    def signal(self, number: int) -> None:
+        """Send a signal."""
+        self._popen.send_signal(number)
+
+    def wait(self) -> int:
+        """Exit code, once it has ended."""
+        return self._popen.wait(PATIENCE)
+
+    def expect(self, text: str) -> None:
+        """Wait until something has been printed."""
+        end = time.monotonic() + PATIENCE
+        while text not in self.output:
+            assert time.monotonic() < end, self.output
+            assert self._popen.poll() is None, self.output
+            time.sleep(0.05)
+
+    @property
+    def modes(self) -> Any:
+        """Modes of the terminal."""
+        return termios.tcgetattr(self._side)
+
+    @property
+    def hands_over_keys(self) -> bool:
+        """True if keys come at once and are not shown."""
+        return not self.modes[3] & (termios.ICANON | termios.ECHO)
+
+    @property
+    def running(self) -> bool:
+        """True while it has not ended."""
+        return self._popen.poll() is None
+
+    def close(self) -> None:
+        """End it whatever it does."""
+        if self._popen.poll() is None:
             self._popen.kill()
             self._popen.wait(PATIENCE)
 

@@ -13,10 +13,14 @@ from pathlib import Path
 import browser
 import numpy as np
 import pytest
+import viser
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, environment, world
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
 
 from sbs_msgs.msg import BodyState, FlightEvent
 from sbs_sim import Aircraft, trim
@@ -30,6 +34,7 @@ from sbs_sim.errors import RecordingError, SimulationError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.multiblade import blade_matrix
+from sbs_sim.nodes.cockpit_node import is_own_page
 from sbs_sim.nodes.conversions import StateMessages, snapshot_of
 from sbs_sim.recording import read
 from sbs_sim.simulation import Simulation, trimmed_state
@@ -208,6 +213,26 @@ def test_messages_of_another_aircraft_are_refused():
         snapshot_of(tandem, made.state, made.rotors, made.inflow, snapshot.swashplate, snapshot.wind)
 
 
+SPOILT = {
+    "a NaN": lambda made: setattr(made.state.velocity, "x", math.nan),
+    "an attitude of 0": lambda made: setattr(made.state.attitude, "w", 0.0),
+    "another number of lag angles": lambda made: setattr(made.rotors.rotors[0], "lag", [0.0]),
+    "an infinite inflow": lambda made: setattr(made.inflow.rotors[1], "uniform", math.inf),
+}
+
+
+@pytest.mark.parametrize("spoil", SPOILT.values(), ids=SPOILT)
+def test_messages_that_no_flight_has_are_refused(spoil):
+    snapshot, _ = snapshot_of_flight(airspeed=0.0)
+    made = StateMessages(AIRCRAFT)
+    made.fill(snapshot)
+    made.state.attitude.x = made.state.attitude.y = made.state.attitude.z = 0.0
+    snapshot_of(AIRCRAFT, made.state, made.rotors, made.inflow, snapshot.swashplate, snapshot.wind)
+    spoil(made)
+    with pytest.raises(SimulationError, match="the flight has"):
+        snapshot_of(AIRCRAFT, made.state, made.rotors, made.inflow, snapshot.swashplate, snapshot.wind)
+
+
 def test_a_recording_gives_what_was_recorded():
     log, recording = read(HOVER_STEP), Recording(HOVER_STEP)
     state, rotors = log["state"], log["rotors"]
@@ -305,6 +330,25 @@ def test_a_wrong_parameter_of_the_simulator_ends_the_cockpit_with_its_line():
     assert any("nonesuch" in line for line in lines)
 
 
+@pytest.mark.parametrize(
+    ("origin", "asked", "host", "own"),
+    [
+        (None, "127.0.0.1:8080", "127.0.0.1", True),  # no browser
+        ("http://127.0.0.1:8080", "127.0.0.1:8080", "127.0.0.1", True),
+        ("http://localhost:9000", "localhost:9000", "127.0.0.1", True),  # through a tunnel
+        ("http://[::1]:8080", "[::1]:8080", "localhost", True),
+        ("http://example.org", "127.0.0.1:8080", "127.0.0.1", False),
+        ("null", "127.0.0.1:8080", "127.0.0.1", False),  # a file, a frame without rights
+        ("http://127.0.0.1:9000", "127.0.0.1:8080", "127.0.0.1", False),
+        ("http://example.org:8080", "example.org:8080", "127.0.0.1", False),  # a name that points to this machine
+        ("http://cockpit.example.org:8080", "cockpit.example.org:8080", "0.0.0.0", True),
+        ("http://example.org", "cockpit.example.org:8080", "0.0.0.0", False),
+    ],
+)
+def test_only_the_cockpits_own_page_may_fly(origin, asked, host, own):
+    assert is_own_page(origin, asked, host) is own
+
+
 # --- in a browser -----------------------------------------------------------------------------------------------
 
 
@@ -363,6 +407,17 @@ def test_it_listens_on_this_machine_alone(flying):
     port = int(address.rpartition(":")[2])
     listening = [line.split()[1] for line in Path("/proc/net/tcp").read_text().splitlines()[1:] if " 0A " in line]
     assert [place for place in listening if int(place.split(":")[1], 16) == port] == [f"0100007F:{port:04X}"]
+
+
+def test_a_page_from_elsewhere_is_cut_off_before_it_is_heard(flying):
+    _, process, address = flying
+    protocol = [Subprotocol(f"viser-v{viser.__version__}")]
+    place = address.replace("http", "ws")
+    with connect(place, subprotocols=protocol, origin=address, max_size=None) as own:
+        assert own.recv(timeout=PATIENCE)
+    with connect(place, subprotocols=protocol, origin="http://example.org") as other, pytest.raises(ConnectionClosed):
+        other.recv(timeout=PATIENCE)
+    assert process.running
 
 
 def test_the_page_draws_the_aircraft(page):

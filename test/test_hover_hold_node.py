@@ -12,11 +12,11 @@ from geometry_msgs.msg import PoseStamped  # noqa: E402
 from ros_harness import DOMAINS, world  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 
-from sbs_msgs.msg import BodyState, Controls, SimulationStatus  # noqa: E402
+from sbs_msgs.msg import BodyState, Controls, FlightEvent, SimulationStatus  # noqa: E402
 from sbs_msgs.srv import Reset, SetWind  # noqa: E402
 from sbs_sim.errors import PilotError  # noqa: E402
 from sbs_sim.model.frames import euler_to_quaternion, quaternion_to_euler  # noqa: E402
-from sbs_sim.nodes.pilot_conversions import to_target  # noqa: E402
+from sbs_sim.nodes.pilot_conversions import check_event, to_target  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -133,6 +133,20 @@ def test_a_refused_target_is_told_and_moves_nothing(flight, client, message, tex
     assert np.linalg.norm(place_of(client.next("state")) - before) < 2.0
 
 
+BAD_EVENTS = {
+    "a NaN in a state": {"kind": "reset", "state": [math.nan] * 43},
+    "half a state": {"kind": "start", "state": [0.0, 0.0, 0.0, 1.0]},
+    "no attitude": {"kind": "reset", "state": [0.0] * 43},
+    "an infinite angle": {"kind": "swashplate", "swashplate": [math.inf] * 6},
+}
+
+
+@pytest.mark.parametrize("given", BAD_EVENTS.values(), ids=BAD_EVENTS)
+def test_no_pilot_begins_from_an_event_that_is_none(given):
+    with pytest.raises(PilotError, match="allowed"):
+        check_event(FlightEvent(**given))
+
+
 def test_after_a_reset_it_stays_where_it_was_put(client):
     request = Reset.Request(heading=-1.0)
     request.position.x, request.position.z = 50.0, -20.0
@@ -173,3 +187,18 @@ def test_without_a_simulator_it_ends_with_one_line(tmp_path):
         process = made.start("hover_hold", patience=1.0)
         assert process.wait() == 1
         assert process.output.splitlines()[-1] == "no service linearize within 1 s: is a simulator running?"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("patience", 0.0, "1 to 3600"),
+        ("position_limit", "nan", "0.05 to 10"),
+        ("largest_distance", 1e6, "0.1 to 100000"),
+    ],
+)
+def test_a_parameter_out_of_range_is_one_line(tmp_path, name, value, allowed):
+    with world(next(DOMAINS), tmp_path) as made:
+        process = made.start("hover_hold", **{name: f".{value}" if value == "nan" else value})
+        assert process.wait() == 1
+        assert process.output.splitlines() == [f"parameter {name} = {value}: allowed are {allowed}"]

@@ -1,17 +1,10 @@
 """Keyboard and joystick as their users meet them: a real terminal, real messages, a simulator in flight."""
 
-import contextlib
-import fcntl
 import math
-import os
-import pty
 import re
-import select
 import signal
 import subprocess
 import sys
-import termios
-import threading
 import time
 
 import numpy as np
@@ -19,7 +12,7 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy")
 
-from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, environment, world  # noqa: E402
+from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, Terminal, environment, world  # noqa: E402
 from sensor_msgs.msg import Joy  # noqa: E402
 
 from sbs_msgs.msg import BodyState, Controls  # noqa: E402
@@ -38,68 +31,6 @@ def controls_of(message):
 def near_trim(message):
     """Within what augmentation does in a calm hover."""
     return np.abs(controls_of(message) - TRIM).max() < math.radians(0.2)
-
-
-class Terminal:
-    """An executable in a terminal of its own."""
-
-    def __init__(self, domain, folder, *arguments):
-        self._user, self._side = pty.openpty()
-        self.before = termios.tcgetattr(self._side)
-        side = self._side
-        self._popen = subprocess.Popen(
-            [sys.executable, str(EXECUTABLES / "teleop"), "--ros-args", *arguments],
-            stdin=side,
-            stdout=side,
-            stderr=side,
-            env=environment(domain, folder),
-            start_new_session=True,
-            preexec_fn=lambda: fcntl.ioctl(side, termios.TIOCSCTTY, 0),  # so that Ctrl-C comes from it
-        )
-        self.output = ""
-        threading.Thread(target=self._read, daemon=True).start()
-
-    def _read(self):
-        with contextlib.suppress(OSError):
-            while True:
-                if select.select([self._user], [], [], 0.1)[0]:
-                    self.output += os.read(self._user, 4096).decode()
-
-    def type(self, keys):
-        """Type keys."""
-        os.write(self._user, keys.encode())
-
-    def signal(self, number):
-        """Send a signal."""
-        self._popen.send_signal(number)
-
-    def wait(self):
-        """Exit code, once it has ended."""
-        return self._popen.wait(PATIENCE)
-
-    def expect(self, text):
-        """Wait until something has been printed."""
-        end = time.monotonic() + PATIENCE
-        while text not in self.output:
-            assert time.monotonic() < end, self.output
-            assert self._popen.poll() is None, self.output
-            time.sleep(0.05)
-
-    @property
-    def modes(self):
-        """Modes of the terminal."""
-        return termios.tcgetattr(self._side)
-
-    @property
-    def hands_over_keys(self):
-        """True if keys come at once and are not shown."""
-        return not self.modes[3] & (termios.ICANON | termios.ECHO)
-
-    def close(self):
-        """End it whatever it does."""
-        if self._popen.poll() is None:
-            self._popen.kill()
-            self._popen.wait(PATIENCE)
 
 
 @pytest.fixture
@@ -134,7 +65,7 @@ def test_keys_fly_and_ctrl_c_gives_the_terminal_back(flight, terminal):
     assert teleop.hands_over_keys
     client.next("controls", near_trim)
 
-    teleop.type("www")  # the collective stays
+    teleop.type("\x13www")  # Ctrl-S holds up no output, and so no flight; the collective stays
     raised = TRIM[0] + math.radians(3.0) * shaped(0.3, 0.0, 0.5)
     client.next("controls", lambda message: abs(message.collective - raised) < 1e-9)
     client.next("state", lambda state: state.velocity.z < -0.05)
@@ -181,12 +112,20 @@ def test_a_signal_while_it_starts_gives_the_terminal_back(terminal, number):
     assert teleop.modes == teleop.before
 
 
-def test_an_error_at_the_start_gives_the_terminal_back(terminal):
-    teleop = terminal("-p", "aircraft:=zeppelin")
+@pytest.mark.parametrize(
+    ("parameter", "line"),
+    [
+        ("aircraft:=zeppelin", "aircraft = 'zeppelin': allowed are a file's path or one of"),
+        ("expo:=.nan", "parameter expo = nan: allowed are 0 to 1"),
+        ("cyclic_deg:=50", "parameter cyclic_deg = 50.0: allowed are 0.1 to 20"),
+    ],
+)
+def test_an_error_at_the_start_gives_the_terminal_back(terminal, parameter, line):
+    teleop = terminal("-p", parameter)
     assert teleop.wait() == 1
     time.sleep(0.3)  # for the reader of its output
     assert teleop.modes == teleop.before
-    assert "aircraft = 'zeppelin': allowed are a file's path or one of" in teleop.output
+    assert line in teleop.output
     assert "Traceback" not in teleop.output
 
 

@@ -2,8 +2,8 @@
 
     ./run python tools/faults.py [NAME ...] [--list]
 
-Real processes over real DDS on loopback: the simulator with its recorder, the control mixer, the analysis and a
-controller that holds hover, each on its own. They are killed one by one and in pairs, sent commands that are late,
+Real processes over real DDS on loopback: the simulator with its recorder, the control mixer, the analysis and the hover
+hold as the controller, each on its own. They are killed one by one and in pairs, sent commands that are late,
 doubled, out of order or ten thousand a second, given a host whose clock jumps, readers that do not read, fifty
 neighbours, a full disk and a fifth of a processor. A line per fault tells what the others did and said; the exit code
 is 1 if one went wrong.
@@ -15,11 +15,13 @@ import itertools
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -37,11 +39,11 @@ from sbs_msgs.msg import BodyState, FlightEvent, SimulationStatus, SwashplateArr
 from sbs_msgs.srv import Trim  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 
-PARTS = ("simulator", "control_mixer", "analysis", "controller")
+PARTS = ("simulator", "control_mixer", "analysis", "hover_hold")
 # What the others say in their diagnostics when a part is gone; nobody needs the analysis to fly.
 MISSED = {
     "control_mixer": ("simulator", "nobody publishes swashplate any more"),
-    "controller": ("control_mixer", "nobody publishes controls any more"),
+    "hover_hold": ("control_mixer", "nobody publishes controls any more"),
     "simulator": ("control_mixer", "no simulator: nobody publishes /clock"),
 }
 LEASE = 40.0  # s: DDS takes 20 to miss somebody who left without a word
@@ -50,7 +52,7 @@ FLOOD = 10_000  # commands a second
 
 
 class System:
-    """Simulator, mixer, analysis and controller as processes of their own, with a client that watches."""
+    """Simulator, mixer, analysis and hover hold as processes of their own, with a client that watches."""
 
     def __init__(self, made: World, parts: tuple[str, ...] = PARTS, **parameters: Any) -> None:
         self.world, self.client = made, made.client
@@ -67,9 +69,7 @@ class System:
 
     def start(self, part: str) -> None:
         """Start a part, or start it again."""
-        if part == "controller":
-            self.parts[part] = _tool(self.world, "hover_controller.py")
-        elif part == "simulator":
+        if part == "simulator":
             log = self.world.folder / f"{time.monotonic_ns()}.mcap"
             self.parts[part] = self.world.start(part, **{"record": log, **self.parameters})
             self.parts[part].record = log
@@ -167,6 +167,7 @@ def replayed(log: Path, *options: str) -> str:
 def killed(*victims: str) -> tuple[str, bool]:
     """Kill -9 of parts; the rest goes on and says what is missing; the parts come back and join."""
     with system() as made:
+        made.client.until(lambda: len(made.swashplates) > 20, "commands")  # who has not been there is not missed
         made.client.spin(2.0)
         steps = made.status().steps
         for victim in victims:
@@ -187,6 +188,27 @@ def killed(*victims: str) -> tuple[str, bool]:
         joined = made.flies() and made.trims()
         words.append("joined again" if joined else "did not join")
         return "; ".join(words), good and joined
+
+
+def killed_cockpit() -> tuple[str, bool]:
+    """Kill -9 of the cockpit that everybody looks at: the flight does not notice, and another one joins."""
+    with system() as made, socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+        free.close()
+        cockpit = made.world.start("cockpit", arguments=["--attach", "--port", str(port)])
+        made.client.until(lambda: _served(port), "the page")
+        cockpit.kill()
+        pace = np.median([status.real_time_factor for status in made.watch(8.0)])
+        again = made.world.start("cockpit", arguments=["--attach", "--port", str(port)])
+        made.client.until(lambda: _served(port), "the page again")
+        text = f"the flight goes on, real-time factor {pace:.2f}; another one serves the page"
+        return text, made.flies() and pace > PACE and again.running
+
+
+def _served(port: int) -> bool:
+    with contextlib.suppress(OSError), urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=1.0) as answer:
+        return bool(answer.status == 200)
+    return False
 
 
 def stamps() -> tuple[str, bool]:
@@ -262,8 +284,10 @@ def flood() -> tuple[str, bool]:
 def two_controllers() -> tuple[str, bool]:
     """Two pilots on one topic."""
     with system() as made:
-        _tool(made.world, "hover_controller.py", "--name", "copilot")
-        heard = made.hears("control_mixer", "2 publishers of controls, the newest command counts: /copilot, /pilot")
+        made.world.start("hover_hold", remaps=["__node:=copilot"])
+        heard = made.hears(
+            "control_mixer", "2 publishers of controls, the newest command counts: /copilot, /hover_hold"
+        )
         return ("told with their names" if heard else "NOT told") + "; the flight goes on", heard and made.flies()
 
 
@@ -420,6 +444,7 @@ Fault = Callable[[], tuple[str, bool]]
 FAULTS: dict[str, Fault] = {
     **{f"kill {part}": (lambda part=part: killed(part)) for part in PARTS},
     **{f"kill {one} and {two}": (lambda a=one, b=two: killed(a, b)) for one, two in itertools.combinations(PARTS, 2)},
+    "kill cockpit": killed_cockpit,
     "stamps": stamps,
     "flood": flood,
     "two controllers": two_controllers,

@@ -15,6 +15,7 @@ The exit code is 1 if something is wrong; each finding is printed with the input
 import argparse
 import contextlib
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -58,7 +59,7 @@ def main() -> int:
     arguments = parser.parse_args()
     with contextlib.ExitStack() as stack:
         live = None if arguments.no_nodes else stack.enter_context(_running())
-        every = [*doors.DOORS, *(live.doors() if live else ())]
+        every = [*doors.DOORS, *((*live.doors(), *live.pilots.doors(), *live.page.doors()) if live else ())]
         whole = sum(door.share for door in every)
         wrong = sum(_push(door, max(5, round(arguments.inputs * door.share / whole)), arguments.seed) for door in every)
         if live:
@@ -119,10 +120,12 @@ def _running() -> Iterator[Any]:
     from ros_harness import DOMAINS, world
 
     domain = next(DOMAINS)
-    with tempfile.TemporaryDirectory() as name, world(domain, Path(name)) as made:
+    with tempfile.TemporaryDirectory() as name, world(domain, Path(name)) as made, contextlib.ExitStack() as stack:
         process = made.start("simulator", record=Path(name) / "fuzz.mcap")
         live = live_doors.Live(domain, process)
         live.log = Path(name) / "fuzz.mcap"
+        live.pilots = stack.enter_context(contextlib.closing(live_doors.Pilots(made)))
+        live.page = stack.enter_context(contextlib.closing(_page(made)))
         for door in live.doors():  # what is loaded with the first use is no leak
             _quietly(door, 50)
         live.before = live.memory()
@@ -130,6 +133,17 @@ def _running() -> Iterator[Any]:
             yield live
         finally:
             live.close()
+
+
+def _page(made: Any) -> Any:
+    """A client of a cockpit that flies the simulator."""
+    import live_doors
+
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    cockpit = made.start("cockpit", arguments=["--attach", "--port", str(port)])
+    made.client.until(lambda: live_doors.served(port), "the page")
+    return live_doors.Page(port, lambda: cockpit.running)
 
 
 def _quietly(door: doors.Door, count: int) -> None:
@@ -141,7 +155,13 @@ def _check_afterwards(live: Any) -> int:
     """Flies, has not grown, and its log is whole; the number of things wrong."""
     return sum(
         _held(name, check)
-        for name, check in (("flies", live.check_alive), ("grown", lambda: _grown(live)), ("log", lambda: _log(live)))
+        for name, check in (
+            ("flies", live.check_alive),
+            ("pilots", live.pilots.check_alive),
+            ("page", live.page.check_alive),
+            ("grown", lambda: _grown(live)),
+            ("log", lambda: _log(live)),
+        )
     )
 
 
@@ -202,7 +222,7 @@ def _guided(reader: str, seconds: float, number: int) -> int:
             command, cwd=name, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True, check=False
         )
         if "No module named 'atheris'" in ended.stderr:
-            print(f"{reader}, guided: atheris is not installed: ./run python -m pip install atheris==3.1.0")
+            print(f"{reader}, guided: atheris is not installed: ./run python -m pip install atheris==3.0.0")
             return 1
         done = [line for line in ended.stderr.splitlines() if "DONE" in line or "cov:" in line]
         print(f"{reader}, guided: {done[-1] if done else ended.stderr[-2000:]}")

@@ -29,7 +29,7 @@ def main() -> None:
         sys.exit(reason)
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGES
     with tempfile.TemporaryDirectory() as bags:
-        own = {"ROS_DOMAIN_ID": "97", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "SBS_SIM_BAGS": bags}
+        own = {"ROS_DOMAIN_ID": "97", "SBS_SIM_BAGS": bags}
         command = [sys.executable, str(COCKPIT), "--port", str(PORT)]
         process = subprocess.Popen(command, env={**os.environ, **own}, stdout=subprocess.PIPE, text=True)
         try:

@@ -25,7 +25,6 @@ def main() -> None:
     """Fly and record."""
     LOG.parent.mkdir(exist_ok=True)
     LOG.unlink(missing_ok=True)
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     os.environ.setdefault("ROS_DOMAIN_ID", "101")
     hover = trim(Aircraft.load("sbs")).controls
     rclpy.init()

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sbs_sim import checks
 from sbs_sim.errors import ExportError
 from sbs_sim.model.state import CONTROL_NAMES
 
@@ -42,9 +43,12 @@ def save(model: "LinearModel", path: str | Path) -> None:
     Raises
     ------
     ExportError
-        Another suffix, or a file that cannot be written.
+        Something else than a linear model, another suffix, or a file that cannot be written.
     """
-    path = Path(path)
+    from sbs_sim.analysis.linearize import LinearModel
+
+    checks.instance("model", model, LinearModel, ExportError)
+    path = checks.path("path", path, ExportError)
     check_target(path, ENCODERS)
     write(path, ENCODERS[path.suffix.lower()](model))
 

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft_values import unit_of
+from sbs_sim.analysis.trim_problem import LIMITS
 from sbs_sim.batch import Batch, Case, percentiles
 from sbs_sim.errors import BatchError
 from sbs_sim.model import state as S
@@ -21,6 +23,7 @@ Array = NDArray[np.float64]
 
 OUTPUTS = ("state", "power")  # of a batch, that `quantities` needs
 SHARES = (5.0, 25.0, 50.0, 75.0, 95.0)  # per cent
+MOST_FLIGHTS = 1_000_000
 LEAST_AIRSPEED = 5.0  # m/s, at which the field passes in hover
 
 
@@ -63,18 +66,22 @@ def gust_cases(
     SbsError
         A path that does not exist, or turbulence out of range.
     """
-    if isinstance(flights, bool) or not isinstance(flights, int) or flights < 1:
-        raise BatchError(f"flights = {flights!r}: allowed are whole numbers from 1")
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**64:
-        raise BatchError(f"seed = {seed!r}: allowed are whole numbers from 0 to 2^64 - 1")
-    centres = {path: (_centre(aircraft, path), _checked_share(path, share)) for path, share in (spread or {}).items()}
+    checks.instance("aircraft", aircraft, Aircraft, BatchError)
+    checks.instance("condition", condition, Mapping, BatchError)
+    flights = checks.whole("flights", flights, 1, MOST_FLIGHTS, BatchError)
+    seed = checks.whole("seed", seed, 0, 2**64 - 1, BatchError)
+    spread = {} if spread is None else spread
+    checks.instance("spread", spread, Mapping, BatchError)
+    centres = {path: (_centre(aircraft, path), _checked_share(path, share)) for path, share in spread.items()}
+    most, unit = LIMITS["airspeed"]
+    airspeed = checks.number("airspeed", condition.get("airspeed", 0.0), -most, most, unit, BatchError)
     cases = []
     for i in range(flights):
         random = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, i])))
         wind = Wind(
             turbulence_intensity=(turbulence, turbulence, turbulence),
             turbulence_length=length,
-            turbulence_airspeed=max(abs(condition.get("airspeed", 0.0)), LEAST_AIRSPEED),
+            turbulence_airspeed=max(abs(airspeed), LEAST_AIRSPEED),
             turbulence_direction=condition.get("sideslip", 0.0),
             turbulence_seed=int(random.integers(2**63)),
         )
@@ -95,9 +102,7 @@ def _centre(aircraft: Aircraft, path: str) -> float:
 
 
 def _checked_share(path: str, share: float) -> float:
-    if isinstance(share, bool) or not isinstance(share, int | float) or not 0.0 <= share <= 1.0:
-        raise BatchError(f"spread of {path} = {share!r}: allowed are 0 to 1")
-    return float(share)
+    return checks.number(f"spread of {path}", share, 0.0, 1.0, "", BatchError)
 
 
 def quantities(batch: Batch) -> dict[str, Array]:
@@ -109,7 +114,7 @@ def quantities(batch: Batch) -> dict[str, Array]:
     attitude = batch["state"][:, :, S.ATTITUDE : S.ATTITUDE + 4]
     flown = ~np.isnan(attitude[:, :, 0])
     angles = np.full((*flown.shape, 3), math.nan)
-    angles[flown] = [quaternion_to_euler(quaternion) for quaternion in attitude[flown]]
+    angles[flown] = np.reshape([quaternion_to_euler(quaternion) for quaternion in attitude[flown]], (-1, 3))
     angles[:, :, ::2] = np.unwrap(angles[:, :, ::2], axis=1)  # yaw and roll, over 180 deg
     named = {f"{name} [deg]": np.degrees(angles[:, :, k]) for name, k in (("roll", 2), ("pitch", 1), ("yaw", 0))}
     power = np.where(flown, np.nansum(batch["power"], axis=2), math.nan)

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Answer = tuple[bool, str]  # whether it was done, and what is to be said
 
 SLIDER_STEP, KEY_STEP = 0.02, 0.1  # deg
+LARGEST_MAGNIFICATION = 20.0
 PACES = ("0.01", "0.05", "0.1", "0.25", "0.5", "1", "2", "as fast as possible")
 LABELS = ("Collective", "Lateral", "Longitudinal", "Differential")
 HINTS = (
@@ -171,7 +172,7 @@ class FlyPanel:
             self._say(button, self._pilot.pause(not self._paused))
         elif button == STEP:
             self._say(button, self._pilot.step(1))
-        else:
+        elif button == RESET:
             self._release()
             self._say(button, self._pilot.reset(self._condition(), self._height.value))
 
@@ -180,13 +181,18 @@ class FlyPanel:
         return TrimCondition(self._airspeed.value, self._climb.value, sideslip, turn)
 
     def _on_pace(self) -> None:
-        factor = 0.0 if self._pace.value == PACES[-1] else float(self._pace.value)
-        self._say("Real-time factor", self._pilot.set_pace(factor))
+        if self._pace.value in PACES:
+            factor = 0.0 if self._pace.value == PACES[-1] else float(self._pace.value)
+            self._say("Real-time factor", self._pilot.set_pace(factor))
 
     def _on_slider(self) -> None:
+        values = np.array([slider.value for slider in self._sliders])
+        if not np.isfinite(values).all():  # what is no page of ours may send anything
+            self._say("Controls", (False, f"{values.tolist()} deg: allowed are finite numbers"))
+            return
         self._holding = True
         self._hold.value = True
-        self._pilot.command(np.radians([slider.value for slider in self._sliders]))
+        self._pilot.command(np.radians(values))
 
     def _on_hold(self) -> None:
         if self._hold.value:
@@ -227,7 +233,7 @@ class FlyPanel:
             return
         for slider, value in zip(self._sliders, np.degrees(controls), strict=True):
             rounded = round(float(value), 3)
-            if abs(slider.value - rounded) > 0.5 * SLIDER_STEP:
+            if not abs(slider.value - rounded) <= 0.5 * SLIDER_STEP:  # true for a NaN as well
                 slider.value = rounded
 
 
@@ -284,7 +290,12 @@ class LogPanel:
             _notify(self._server, "Log refused", message)
 
     def _on_place(self) -> None:
-        self.moved = True
+        self.moved = math.isfinite(self.place.value)
+
+    @property
+    def speed(self) -> float:
+        """Recorded time over wall time; 1 for what is none of those to choose from."""
+        return float(self.rate.value) if self.rate.value in PACES[:-1] else 1.0
 
     def enable(self, there: bool, beginning: float = 0.0, end: float = 1.0) -> None:
         """Offer the controls of a log from a beginning to an end [s]."""
@@ -307,9 +318,14 @@ class ViewPanel:
     def __init__(self, server: ViserServer, shown: Shown) -> None:
         gui = server.gui
         magnification = gui.add_slider(
-            "Flap, lag ×", 1.0, 20.0, 0.5, shown.magnification, hint="flap and lag angles are drawn that much larger"
+            "Flap, lag ×",
+            1.0,
+            LARGEST_MAGNIFICATION,
+            0.5,
+            shown.magnification,
+            hint="flap and lag angles are drawn that much larger",
         )
-        magnification.on_update(lambda _: setattr(shown, "magnification", magnification.value))
+        magnification.on_update(lambda _: _magnify(shown, magnification.value))
         for field, label in (
             ("ducts", "Ducts"),
             ("paths", "Tip paths"),
@@ -321,6 +337,11 @@ class ViewPanel:
             box.on_update(lambda _, field=field, box=box: setattr(shown, field, box.value))
         cameras = gui.add_button_group("From", tuple(CAMERAS))
         cameras.on_click(lambda event: place_camera(event.client, CAMERAS[event.target.value]))
+
+
+def _magnify(shown: Shown, value: float) -> None:
+    if 1.0 <= value <= LARGEST_MAGNIFICATION:  # false for a NaN as well
+        shown.magnification = value
 
 
 CAMERAS = {"behind": (-2.0, 1.2, 1.0), "left": (0.0, 2.6, 0.3), "above": (-0.01, 0.0, 3.0), "front": (2.2, 0.7, 0.6)}

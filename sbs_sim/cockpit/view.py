@@ -183,10 +183,10 @@ class View:
 
     def _replayed(self, recording: Recording, elapsed: float) -> Live:
         """Instant of a log; the slider and the clock move it."""
-        rate = float(self._logs.rate.value)
+        rate = self._logs.speed
         if self._logs.moved:
             self._logs.moved = False
-            self._place = float(self._logs.place.value)
+            self._place = min(max(float(self._logs.place.value), recording.beginning), recording.end)
             self._forget()
         elif self._logs.playing.value:
             self._place = min(self._place + rate * elapsed, recording.end)

@@ -31,7 +31,7 @@ def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.recording import read
     from sbs_sim.recording.plot import SUFFIXES, plot
 
-    targets = arguments.out or [Path(arguments.file.name).with_suffix(".png")]
+    targets = arguments.out or [Path(f"{arguments.file.stem or 'log'}.png")]  # "." has no name
     for path in targets:
         check_target(path, SUFFIXES)
     log = read(arguments.file)

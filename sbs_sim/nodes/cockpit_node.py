@@ -4,12 +4,17 @@ Subscribes `state`, `rotors`, `inflow`, `events`, `status`, `linear_model`; publ
 `reset`, `set_wind`, `trim`, `linearize`, and sets the simulator's `real_time_factor`.
 """
 
+import ipaddress
+import math
 import os
 import sys
 import threading
 import time
 import traceback
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import rich
@@ -17,16 +22,17 @@ from numpy.typing import NDArray
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from viser import ViserServer
+from viser.infra import WebsockClientConnection
 
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, LinearModel, RotorStateArray, SimulationStatus
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.cockpit.poles import Pole
 from sbs_sim.cockpit.readouts import Status
 from sbs_sim.cockpit.view import FRAME_PERIOD, Live, View
-from sbs_sim.errors import SbsError
+from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.model.state import SWASHPLATE_NAMES
 from sbs_sim.nodes.conversions import snapshot_of
-from sbs_sim.nodes.host import EVENT_QOS, LATCHED_QOS, Component
+from sbs_sim.nodes.host import COMPLAINT_PERIOD, EVENT_QOS, LATCHED_QOS, Component
 from sbs_sim.nodes.remote_pilot import RemotePilot
 
 Array = NDArray[np.float64]
@@ -82,24 +88,30 @@ class Cockpit(Component):
             self._arrived = time.monotonic()
 
     def _on_event(self, event: FlightEvent) -> None:
-        if len(event.swashplate):
-            self._swashplate = np.array(event.swashplate).reshape(-1, len(SWASHPLATE_NAMES))
-        if event.kind in (FlightEvent.START, FlightEvent.WIND):
-            velocity = event.wind.velocity
-            self._wind = np.array([velocity.x, velocity.y, velocity.z])
+        angles, velocity = np.array(event.swashplate), event.wind.velocity
+        if len(angles) and not len(angles) % len(SWASHPLATE_NAMES) and np.isfinite(angles).all():
+            self._swashplate = angles.reshape(-1, len(SWASHPLATE_NAMES))
+        wind = np.array([velocity.x, velocity.y, velocity.z])
+        if event.kind in (FlightEvent.START, FlightEvent.WIND) and np.isfinite(wind).all():
+            self._wind = wind
 
     def _on_model(self, model: LinearModel) -> None:
         self._model = model
 
     def _live(self) -> Live | None:
-        """The flight of the newest messages; None before there is one."""
-        newest = {name: deserialize_message(data, MESSAGES[name]) for name, data in dict(self._newest).items()}
-        if len(newest) < len(MESSAGES) or self._swashplate is None or self._aircraft is None:
+        """The flight of the newest messages; None before there is one, or while they cannot be drawn."""
+        try:
+            newest = {name: _message(data, MESSAGES[name]) for name, data in dict(self._newest).items()}
+            if len(newest) < len(MESSAGES) or self._swashplate is None or self._aircraft is None:
+                return None
+            told = newest["status"]
+            snapshot = snapshot_of(
+                self._aircraft, newest["state"], newest["rotors"], newest["inflow"], self._swashplate, self._wind
+            )
+            _check_status(told)
+        except SbsError as error:
+            self.get_logger().warning(f"not drawn: {error}", throttle_duration_sec=COMPLAINT_PERIOD)
             return None
-        told = newest["status"]
-        snapshot = snapshot_of(
-            self._aircraft, newest["state"], newest["rotors"], newest["inflow"], self._swashplate, self._wind
-        )
         playing, age = told.state == SimulationStatus.PLAYING, time.monotonic() - self._arrived
         if playing and age > SILENCE:
             told.fault = told.fault or f"no message of the simulator for {age:.0f} s"
@@ -140,15 +152,37 @@ class Cockpit(Component):
         print(f"cockpit: http://{host}:{port}", flush=True)
         before = due = time.monotonic()
         while not self._end.is_set():
-            model, self._model = self._model, None
-            if model is not None:
-                view.show_model(*_poles(model))
             now = time.monotonic()
-            view.draw(now - before)
+            try:
+                self._draw(view, now - before)
+            except Exception:  # the end of the page would be that of the flight
+                text = f"internal error: {traceback.format_exc()}"
+                self.get_logger().error(text, throttle_duration_sec=COMPLAINT_PERIOD)
             before = now
             due = max(due + FRAME_PERIOD, time.monotonic())
             self._end.wait(due - time.monotonic())
         server.stop()
+
+    def _draw(self, view: View, elapsed: float) -> None:
+        model, self._model = self._model, None
+        if model is not None:
+            poles, title = _poles(model)
+            if all(np.isfinite(pole.value) for pole in poles):
+                view.show_model(poles, title)
+        view.draw(elapsed)
+
+
+def _message(data: bytes, kind: Any) -> Any:
+    """Message of its bytes, which are whatever somebody has sent."""
+    try:
+        return deserialize_message(data, kind)
+    except Exception as error:  # rclpy has errors of several kinds for that
+        raise SimulationError(f"no {kind.__name__}: {' '.join(str(error).split())}") from None
+
+
+def _check_status(told: SimulationStatus) -> None:
+    if not math.isfinite(told.real_time_factor):
+        raise SimulationError(f"real_time_factor = {told.real_time_factor}: allowed are finite numbers")
 
 
 def _status(told: SimulationStatus) -> Status:
@@ -178,7 +212,44 @@ def serve(host: str, port: int) -> ViserServer:
     if server.get_port() != port:  # viser goes on to the next port that is free
         server.stop()
         raise SbsError(f"cannot serve on {host}:{port}: it is in use")
+    _refuse_other_pages(server, host)
     return server
+
+
+def _refuse_other_pages(server: ViserServer, host: str) -> None:
+    """Let no other page that the browser shows fly: browsers allow any of them to connect to this machine.
+
+    They say in `Origin` where the page is from. Where the cockpit serves this machine only, it must be an address or
+    `localhost` as well, or a name that somebody lets point to this machine would do.
+    """
+    connections = server._websock_server
+
+    async def check(client: WebsockClientConnection) -> None:
+        connection = connections._live_connections[client.client_id]
+        headers = connection.request.headers if connection.request else {}
+        if not is_own_page(headers.get("Origin"), headers.get("Host", ""), host):
+            connection.transport.abort()  # before anything that it has sent is read
+
+    connections.on_client_connect(check)
+
+
+def is_own_page(origin: str | None, asked: str, host: str) -> bool:
+    """True if a page from `origin` (none for what is no browser) that was asked for at `asked` may fly."""
+    if origin is None:
+        return True
+    name = urlsplit(f"//{asked}").hostname or ""
+    return urlsplit(origin).netloc == asked and (
+        not _is_address(host, lambda address: address.is_loopback)
+        or name in ("localhost", host)
+        or _is_address(name, lambda _: True)
+    )
+
+
+def _is_address(text: str, holds: Callable[[ipaddress.IPv4Address | ipaddress.IPv6Address], bool]) -> bool:
+    try:
+        return holds(ipaddress.ip_address("127.0.0.1" if text == "localhost" else text))
+    except ValueError:
+        return False
 
 
 def bags() -> Path:

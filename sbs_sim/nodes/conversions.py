@@ -54,6 +54,7 @@ FRAME_BODY = "base_link_frd"
 FRAME_ODOM = "odom"
 FRAME_BASE = "base_link"
 HALF = math.sqrt(0.5)
+LARGEST = 1e9  # of any number of a flight that can be shown
 DEFAULT_TURBULENCE_LENGTH = 50.0  # m
 LEAST_TURBULENCE_AIRSPEED = 1.0  # m/s
 
@@ -272,11 +273,12 @@ def snapshot_of(
     Raises
     ------
     SimulationError
-        The messages are of an aircraft with other rotors.
+        The messages are of an aircraft with other rotors, or have numbers that no flight has.
     """
     layout, count = aircraft.layout, len(aircraft.rotors)
     blades = tuple(len(rotor.flap) for rotor in rotors.rotors)
-    if blades != layout.blades or len(inflow.rotors) != count:
+    sizes = {len(values) for rotor in rotors.rotors for values in (rotor.flap_rate, rotor.lag, rotor.lag_rate)}
+    if blades != layout.blades or len(inflow.rotors) != count or not sizes <= set(blades):
         raise SimulationError(f"the flight has rotors with {blades} blades, {aircraft.name} has {layout.blades}")
     state = np.empty(layout.size)
     attitude = body.attitude
@@ -292,13 +294,20 @@ def snapshot_of(
         loads[j, P.THRUST], loads[j, P.TORQUE] = rotor.thrust, rotor.torque
         loads[j, P.FORCE : P.FORCE + 3] = _triple(rotor.hub.force)
         loads[j, P.MOMENT : P.MOMENT + 3] = _triple(rotor.hub.torque)
+    acceleration = np.array(_triple(body.acceleration))
+    azimuth = np.array([rotor.azimuth for rotor in rotors.rotors])
+    for values in (state, acceleration, azimuth, loads):
+        if not np.all(np.abs(values) < LARGEST):  # false for a NaN as well
+            raise SimulationError(f"the flight has numbers that are not finite or beyond {LARGEST:g}")
+    if not state[S.ATTITUDE : S.VELOCITY].any():
+        raise SimulationError("the flight has an attitude of 0: allowed is a quaternion")
     return Snapshot(
         step=0,
         time=to_seconds(body.header.stamp),
         state=state,
-        acceleration=np.array(_triple(body.acceleration)),
+        acceleration=acceleration,
         swashplate=swashplate,
-        azimuth=np.array([rotor.azimuth for rotor in rotors.rotors]),
+        azimuth=azimuth,
         loads=loads,
         wind=wind,
     )

@@ -251,7 +251,7 @@ def run(
     if leftover:
         print(f"unknown argument {leftover[0]}: parameters are given as --ros-args -p name:=value", file=sys.stderr)
         return 2
-    _keep_to_this_machine()
+    keep_to_this_machine()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
@@ -303,11 +303,17 @@ def own_arguments(args: list[str] | None) -> list[str]:
         raise SbsError(f"wrong --ros-args: {_one_line(error)}") from None
 
 
-def _keep_to_this_machine() -> None:
-    """Have DDS open no port to the network where discovery is for this machine only; that alone does not see to it."""
+def keep_to_this_machine() -> None:
+    """Have Fast DDS use 127.0.0.1 and nothing else where discovery is for this machine only: see config/loopback.xml.
+
+    A profile of the user's own is left alone. To be called before ROS is started.
+    """
     profiles = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-    if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST" and not any(map(os.environ.get, profiles)):
+    is_ours = rclpy.utilities.get_rmw_implementation_identifier().startswith("rmw_fastrtps")
+    local = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
+    if local and is_ours and not any(map(os.environ.get, profiles)):
         os.environ[profiles[0]] = str(config_folder() / "loopback.xml")
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "SYSTEM_DEFAULT"  # what the profile says
 
 
 def _spin(node: Node, stop: threading.Event) -> None:

@@ -15,7 +15,7 @@ from sbs_msgs.msg import BodyState, Controls, FlightEvent, SimulationStatus
 from sbs_sim.errors import SbsError
 from sbs_sim.nodes.conversions import to_seconds
 from sbs_sim.nodes.host import COMMAND_QOS, EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Component, Refusals, diagnostic
-from sbs_sim.nodes.pilot_conversions import body_array, controls_message
+from sbs_sim.nodes.pilot_conversions import body_array, check_event, controls_message
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class PilotNode(Component):
         self.time = 0.0
         self._arrived = time.monotonic()
         self._paused = self._stale = False
-        self._bad_states = Refusals(self, "state")
+        self._bad_states, self._bad_events = Refusals(self, "state"), Refusals(self, "events")
         self._output = self.create_publisher(Controls, "controls", COMMAND_QOS)
         self._health = self.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
         self.create_subscription(FlightEvent, "events", self._on_event, EVENT_QOS)
@@ -76,6 +76,11 @@ class PilotNode(Component):
         self.time, self.body, self._arrived = now, body, time.monotonic()
 
     def _on_event(self, message: FlightEvent) -> None:
+        try:
+            check_event(message)
+        except SbsError as error:
+            self._bad_events.add(error)
+            return
         self.on_event(message, self.body is not None and to_seconds(message.header.stamp) >= self.time - LATE)
 
     def _on_status(self, message: SimulationStatus) -> None:
@@ -88,6 +93,7 @@ class PilotNode(Component):
             self.get_logger().warning(f"no state for {STALE:g} s: the last controls stay")
         self._stale = stale
         problems = ([f"no state for {STALE:g} s"] if stale else []) + self.problems()
-        values = {"paused": self._paused, **self.values()}
+        refused = {"rejected_states": self._bad_states.count, "rejected_events": self._bad_events.count}
+        values = {"paused": self._paused, **refused, **self.values()}
         status = diagnostic(self.get_name(), [(DiagnosticStatus.WARN, text) for text in problems], values)
         self._health.publish(DiagnosticArray(status=[status]))

@@ -10,12 +10,19 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from numpy.typing import NDArray
 
-from sbs_msgs.msg import BodyState, Controls, LinearModel
+from sbs_msgs.msg import BodyState, Controls, FlightEvent, LinearModel
 from sbs_sim.errors import PilotError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
-from sbs_sim.nodes.conversions import FRAME_NED, FRAME_ODOM, controls_array, enu_flu_quaternion, point_array
-from sbs_sim.pilot.hover_hold import HoverModel
+from sbs_sim.nodes.conversions import (
+    FRAME_NED,
+    FRAME_ODOM,
+    controls_array,
+    enu_flu_quaternion,
+    point_array,
+    to_seconds,
+)
+from sbs_sim.pilot.hover_hold import HoverModel, checked_body
 
 Array = NDArray[np.float64]
 
@@ -35,6 +42,14 @@ def body_array(message: BodyState) -> Array:
     attitude = np.array([q.w, q.x, q.y, q.z])
     vectors = [point_array(part) for part in (message.velocity, message.angular_velocity)]
     return np.concatenate([point_array(message.position), attitude, *vectors])
+
+
+def check_event(message: FlightEvent) -> None:
+    """Raise PilotError for an event that no pilot can begin from: numbers that are not finite, half a state."""
+    if not np.all(np.isfinite(message.swashplate)):
+        raise PilotError(f"swashplate = {list(message.swashplate)}: allowed are finite numbers")
+    if message.kind in (FlightEvent.START, FlightEvent.RESET):
+        checked_body(to_seconds(message.header.stamp), message.state)
 
 
 def hover_model(message: LinearModel) -> HoverModel:

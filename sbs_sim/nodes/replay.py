@@ -8,6 +8,7 @@ import argparse
 import importlib
 import itertools
 import math
+import re
 import signal
 import sys
 import threading
@@ -18,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ament_index_python.packages import get_packages_with_prefixes
 from mcap.records import Channel, Schema
 from nav_msgs.msg import Odometry
 from rclpy.exceptions import NameValidationException
@@ -52,6 +54,7 @@ LOOKOUT = 10.0  # s of playing in which somebody may still be discovered: most a
 SHORTEST_PASS = 0.05  # s of wall time: a loop over an instant is no flood
 RECOVERED = ".recovered.mcap"
 DEEPEST = 10_000  # messages that a publisher keeps, whatever a log asks for
+MESSAGE_TYPE = re.compile(r"(?P<package>[a-z][a-z0-9_]*)/(msg/)?(?P<name>[A-Z][A-Za-z0-9]*)")
 
 
 class Replay(Component):
@@ -234,12 +237,8 @@ def installed_type(channel: Channel, schema: Schema | None) -> Any:
     """
     if schema is None or channel.message_encoding != "cdr":
         raise SbsError(f"its messages are no ROS 2 messages but {channel.message_encoding or 'of no known kind'}")
-    package, _, name = schema.name.partition("/")
-    try:
-        kind = getattr(importlib.import_module(f"{package}.msg"), name.rpartition("/")[2])
-    except (ImportError, AttributeError, ValueError, TypeError):  # the latter for names that no module can have
-        kind = None
-    if not hasattr(kind, "get_fields_and_field_types"):
+    kind = _installed(schema.name)
+    if kind is None:
         raise SbsError(f"{schema.name} is not installed")
     if schema.encoding == "ros2msg" and schema.data:
         recorded = _fields(schema.name, schema.data.decode(errors="replace"))
@@ -247,6 +246,18 @@ def installed_type(channel: Channel, schema: Schema | None) -> Any:
         if any(recorded.get(name) != fields for name, fields in installed.items()):
             raise SbsError(f"{schema.name} is installed with other fields than were recorded")
     return kind
+
+
+def _installed(type_name: str) -> Any:
+    """Class of a message type, None if ROS has none of that name: to import is to execute, so nothing else is."""
+    found = MESSAGE_TYPE.fullmatch(type_name)
+    if found is None or found["package"] not in get_packages_with_prefixes():
+        return None
+    try:
+        kind = getattr(importlib.import_module(f"{found['package']}.msg"), found["name"])
+    except (ImportError, AttributeError):
+        return None
+    return kind if hasattr(kind, "get_fields_and_field_types") else None
 
 
 def _fields(type_name: str, text: str) -> dict[str, list[tuple[str, str, int | None]]]:

@@ -150,6 +150,9 @@ def keys_at_once() -> Iterator[Callable[[], None]]:
         for name in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(name, leave)
         tty.setcbreak(number)
+        modes = termios.tcgetattr(number)
+        modes[0] &= ~termios.IXON  # or Ctrl-S would hold up the output, and with it the flight
+        termios.tcsetattr(number, termios.TCSANOW, modes)
         yield restore
     finally:
         restore()

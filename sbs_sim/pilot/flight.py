@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint
 from sbs_sim.errors import PilotError
 from sbs_sim.mixer import Mixer
+from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
 from sbs_sim.simulation import Simulation, histories, trimmed_state
 
@@ -56,12 +58,15 @@ def fly(
     Raises
     ------
     PilotError
-        A delay out of range.
+        An aircraft that is none, a delay or a duration out of range, controls that are not four numbers.
     SimulationError
         See `Simulation`, `Mixer.set_target`.
     """
-    if not 0 <= delay <= MOST_DELAY:
-        raise PilotError(f"delay = {delay}: allowed are 0 to {MOST_DELAY} ticks")
+    checks.instance("aircraft", aircraft, Aircraft, PilotError)
+    delay = checks.whole("delay", delay, 0, MOST_DELAY, PilotError)
+    duration = checks.number("duration", duration, 0.0, 1e6, "s", PilotError)
+    if not callable(pilot):
+        raise PilotError(f"pilot = {checks.shown(pilot)}: allowed are functions of time and state")
     mixer = Mixer(aircraft)
     waiting: collections.deque[Array] = collections.deque()
     if isinstance(start, TrimPoint):
@@ -69,16 +74,24 @@ def fly(
         mixer.stand(start.swashplate)
         waiting.extend([start.controls] * delay)
     else:
-        state = np.asarray(start, dtype=float)
-    given = [np.asarray(pilot(0.0, state), dtype=float)]
+        state = checks.array("start", start, PilotError)
+    given = [_asked(pilot, 0.0, state)]
     simulation = Simulation(aircraft, state, aircraft.mix(given[0]), wind=wind, **options)
     snapshots = []
     for tick in range(round(duration / simulation.tick) + 1):
         if tick > 0:
             simulation.advance()
-            given.append(np.asarray(pilot(simulation.time, simulation.state), dtype=float))
+            given.append(_asked(pilot, simulation.time, simulation.state))
         waiting.append(given[-1])
         mixer.set_target(waiting.popleft() if len(waiting) > delay else waiting[0])
         simulation.set_swashplate(mixer.move(simulation.time))
         snapshots.append(simulation.snapshot())
     return histories(aircraft, snapshots, given)
+
+
+def _asked(pilot: Callable[[float, Array], ArrayLike], time: float, state: Array) -> Array:
+    """Controls that a pilot gives, shape (4,); what is in them is for the mixer to check."""
+    controls = checks.array("controls", pilot(time, state), PilotError)
+    if controls.shape != (len(CONTROL_NAMES),):
+        raise PilotError(f"controls = {checks.shown(controls.tolist())}: allowed are {len(CONTROL_NAMES)} numbers")
+    return controls

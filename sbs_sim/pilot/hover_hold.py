@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sbs_sim import checks
 from sbs_sim.analysis.linearize import LinearModel, settle
 from sbs_sim.errors import PilotError
 from sbs_sim.model import state as S
@@ -42,11 +43,13 @@ LIMITS = {  # departures that cost alike: metres, seconds, radians
     **dict.fromkeys(("collective", "lateral_cyclic", "longitudinal_cyclic"), math.radians(1.0)),
     "differential_longitudinal_cyclic": math.radians(2.0),
 }
+LIMIT_RANGE = 1e-4, 1e4  # of any of them
 AUTHORITY = math.radians(5.0)  # rad, largest departure of a control from its trim
 REACH = 1.5  # m; a target that is farther away counts as this far, which limits attitude and speed on the way
 TURN_REACH = math.radians(30.0)  # rad, likewise for the heading
 LONGEST_GAP = 0.1  # s between two states that integrals go on over
 AT_REST = 1e-9  # m/s, rad/s
+LARGEST = 1e9  # of any value of a state that can be flown by: squares and products of them stay numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +158,11 @@ def design(model: HoverModel, limits: Mapping[str, float] | None = None) -> Hove
     Raises
     ------
     PilotError
-        A limit of an unknown name or not positive; or a model that this feedback does not stabilise, with all states.
+        A limit of an unknown name or not from 0.0001 to 10 000; or a model that this feedback does not stabilise, with
+        all states.
     """
-    wanted = _checked_limits(limits or {})
+    checks.instance("model", model, HoverModel, PilotError)
+    wanted = _checked_limits({} if limits is None else limits)
     a, b = design_matrices(model)
     states = np.array([wanted.get(name, math.inf) for name in STATES])
     gains, poles, cost = lqr(a, b, states, np.array([wanted[name] for name in S.CONTROL_NAMES]))
@@ -186,11 +191,11 @@ def _anticipation(cost: Array) -> Array:
 
 
 def _checked_limits(changes: Mapping[str, float]) -> dict[str, float]:
+    checks.instance("limits", changes, Mapping, PilotError)
     for name, value in changes.items():
         if name not in LIMITS:
-            raise PilotError(f"limit {name}: unknown, allowed are {', '.join(LIMITS)}")
-        if not 0.0 < value < math.inf:  # false for a NaN as well
-            raise PilotError(f"limit {name} = {value}: allowed are positive numbers")
+            raise PilotError(f"limit {checks.shown(name)}: unknown, allowed are {', '.join(LIMITS)}")
+        checks.number(f"limit {name}", value, *LIMIT_RANGE, "", PilotError)
     return {**LIMITS, **changes}
 
 
@@ -264,10 +269,10 @@ class HoverHold:
         PilotError
             A number that is not finite.
         """
-        place = np.array(position, dtype=float)
-        if place.shape != (3,) or not np.all(np.isfinite(place)) or not math.isfinite(heading):
-            raise PilotError(f"target {place.tolist()}, heading {heading}: allowed are three finite numbers and one")
-        self._wanted = (place, heading)
+        place = checks.array("position", position, PilotError)
+        if place.shape != (3,) or not np.all(np.abs(place) <= LARGEST):
+            raise PilotError(f"position = {checks.shown(place.tolist())}: allowed are 3 numbers up to {LARGEST:g} m")
+        self._wanted = (place, checks.number("heading", heading, -LARGEST, LARGEST, "rad", PilotError))
 
     def controls(self, time: float, body: ArrayLike) -> Array:
         """Pilot controls [rad], shape (4,), of a state.
@@ -334,9 +339,15 @@ def checked_body(time: float, body: ArrayLike) -> Array:
     PilotError
         It is not, or the time [s] is not.
     """
-    values = np.asarray(body, dtype=float)[: S.BODY_SIZE]
-    if not (np.all(np.isfinite(values)) and math.isfinite(time)):
-        raise PilotError(f"state {values.tolist()} at {time}: allowed are finite numbers")
+    values = checks.array("state", body, PilotError)
+    if values.ndim != 1 or len(values) < S.BODY_SIZE:
+        raise PilotError(f"state has the shape {values.shape}: allowed are {S.BODY_SIZE} numbers or more")
+    values = values[: S.BODY_SIZE]
+    checks.number("time", time, -LARGEST, LARGEST, "s", PilotError)
+    if not np.all(np.abs(values) <= LARGEST):  # false for a NaN as well
+        raise PilotError(f"state {values.tolist()} at {time:g} s: allowed are -{LARGEST:g} to {LARGEST:g}")
+    if not values[S.ATTITUDE : S.VELOCITY].any():
+        raise PilotError("state: attitude = 0: allowed is a quaternion")
     return values
 
 

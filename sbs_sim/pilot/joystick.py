@@ -4,13 +4,12 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim import config_file
+from sbs_sim import checks, config_file
 from sbs_sim.aircraft import config_folder
 from sbs_sim.errors import PilotError
 from sbs_sim.model.state import CONTROL_NAMES
@@ -55,15 +54,14 @@ class JoystickFile:
         PilotError
             One line that names the file and every wrong key with its value and what is allowed, or the pads there are.
         """
-        place = Path(path) if path else config_folder() / "joystick.yaml"
+        place = checks.path("config", path, PilotError) if path else config_folder() / "joystick.yaml"
         try:
             if not place.is_file():
                 raise PilotError("there is no such file")
             data = config_file.read_yaml(place)
             if found := config_file.problems(data, _validator()):
                 raise PilotError("; ".join(found))
-            if pad not in data["pads"]:
-                raise PilotError(f"pad = {pad!r}: allowed are {', '.join(data['pads'])}")
+            checks.choice("pad", pad, data["pads"], PilotError)
         except (PilotError, config_file.UnreadableError) as error:
             raise PilotError(f"{place}: {error}") from None
         return cls(

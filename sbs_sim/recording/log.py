@@ -82,11 +82,11 @@ class Topic(Mapping[str, NDArray[Any]]):
     def _columns(self) -> Columns:
         """Decoded when it is first asked for."""
         try:
-            return decode(self._schema, self._definitions, short_name(self.type), self._messages)
+            columns = decode(self._schema, self._definitions, short_name(self.type), self._messages)
         except (RecordingError, UnicodeDecodeError) as error:
             raise RecordingError(f"topic {self.name}: {error}") from None
-        finally:
-            self._messages = []
+        self._messages = []  # not before: what could not be decoded once must not look like no messages afterwards
+        return columns
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self._columns:

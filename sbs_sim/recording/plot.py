@@ -89,9 +89,13 @@ def flight_figure(log: Log) -> Figure:
 
 def _curves(log: Log, label: str, make: Callable[[Log], Curves]) -> Curves:
     try:
-        return make(log)
+        curves = make(log)
+        for name, (time, values) in curves.items():
+            if values.shape != time.shape:
+                raise ValueError(f"{name} is not a number in every message")
     except (LookupError, TypeError, ValueError) as error:  # topics of our names with other fields
         raise RecordingError(f"{log.path}: {label} cannot be drawn: {' '.join(str(error).split())}") from None
+    return curves
 
 
 def _draw(axes: Axes, label: str, curves: Curves) -> None:

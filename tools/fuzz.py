@@ -201,7 +201,7 @@ for module in pkgutil.iter_modules(sbs_sim.model.__path__, "sbs_sim.model."):
     importlib.import_module(module.name)  # before: what is instrumented cannot be compiled
 with atheris.instrument_imports(include=["sbs_sim.aircraft", "sbs_sim.recording", "ruamel.yaml", "mcap"]):
     import doors
-check = {"yaml": doors.check_yaml, "mcap": doors.check_log}[sys.argv[1]]
+check = {"yaml": doors.check_yaml, "mcap": doors.check_reading}[sys.argv[1]]
 atheris.Setup([sys.argv[0], *sys.argv[2:]], check)
 atheris.Fuzz()
 """

@@ -25,13 +25,14 @@ from std_srvs.srv import SetBool
 
 from sbs_msgs.action import Sweep
 from sbs_msgs.msg import BodyState, Controls, SimulationStatus, SwashplateArray
-from sbs_msgs.srv import Linearize, Reset, SetWind, Step, Trim
+from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim
 
 SERVICES = {
     "pause": SetBool,
     "step": Step,
     "reset": Reset,
     "set_wind": SetWind,
+    "record": Record,
     "trim": Trim,
     "linearize": Linearize,
     "simulator/set_parameters": SetParameters,

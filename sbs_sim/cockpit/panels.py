@@ -30,6 +30,7 @@ HINTS = (
 KEYS = (("H", "Y"), ("J", "L"), ("K", "I"), ("O", "U"))
 LIVE = "live"
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
+RECORD, END_RECORD = "Record", "End recording"
 
 
 class Pilot(Protocol):
@@ -52,6 +53,9 @@ class Pilot(Protocol):
 
     def set_wind(self, velocity: Array, turbulence: float) -> Answer:
         """Steady wind, NED [m/s], shape (3,), and standard deviation of turbulence in all directions [m/s]."""
+
+    def record(self, on: bool) -> Answer:
+        """Begin a log in the default folder, or end the present one."""
 
     def trim(self, condition: TrimCondition) -> Answer:
         """Trim a condition and tell the result."""
@@ -93,6 +97,7 @@ class FlyPanel:
     ) -> None:
         self._server, self._pilot, self._here = server, pilot, here
         self._paused = False
+        self._recording = False
         self._holding = False
         self._ranges = np.degrees([aircraft.control_ranges[name] for name in CONTROL_NAMES])
         self._add_clock()
@@ -110,6 +115,8 @@ class FlyPanel:
         self._clock.on_click(lambda event: self._on_clock(event.target.value))
         self._pace = gui.add_dropdown("Real time ×", PACES, initial_value="1")
         self._pace.on_update(_by_user(self._on_pace))
+        self._record = gui.add_button(RECORD, hint="begins a log of the flight as it is now, or ends the present one")
+        self._record.on_click(lambda _: self._say("Recording", self._pilot.record(not self._recording)))
 
     def _add_controls(self) -> None:
         gui = self._server.gui
@@ -218,8 +225,11 @@ class FlyPanel:
 
     # ------------------------------------------------------------------------------------------------------ update
 
-    def update(self, controls: Array, playing: bool) -> None:
+    def update(self, controls: Array, playing: bool, recording: bool) -> None:
         """Follow the flight: the controls that are in force [rad], unless this page commands them."""
+        if self._recording != recording:
+            self._recording = recording
+            self._record.label = END_RECORD if recording else RECORD
         if self._paused == playing:
             self._paused = not playing
             self._clock.options = (PAUSE if playing else PLAY, STEP, RESET)

@@ -167,7 +167,7 @@ class View:
                 self._draw(shown)
             if live is not None and self._frames % READOUT_EVERY == 0:
                 controls = pilot_controls(self._aircraft, live.snapshot.swashplate)
-                self._fly.update(controls, live.status.playing)
+                self._fly.update(controls, live.status.playing, bool(live.status.log))
 
     def _draw(self, shown: Live) -> None:
         snapshot = shown.snapshot

@@ -38,7 +38,7 @@ from sbs_sim.recording import Log, message_definition, read, recover
 from sbs_sim.recording.definitions import parse
 from sbs_sim.recording.flight import TOLERANCE, Flight, flight_of, verify, whole_until
 from sbs_sim.recording.playback import Playback
-from sbs_sim.simulation import Simulation, refly
+from sbs_sim.simulation import begun, refly
 
 LARGEST_RATE = 1000.0
 LONGEST_DELAY = 3600.0  # s
@@ -311,10 +311,7 @@ def fly_with(
     aircraft = flight.aircraft
     for change in changes:
         aircraft = changed(aircraft, change)
-    start = flight.events[0]
-    if start.state is None or start.swashplate is None:
-        raise RecordingError("the log lacks the start of its flight")
-    simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **flight.options)
+    simulation = begun(aircraft, flight.events, **flight.options)
     log = Recorder(str(output), simulation, {"with": list(changes)})
     try:
         steps = _write_flight(replace(flight, aircraft=aircraft), last, simulation.step_size, log, stop)
@@ -346,7 +343,7 @@ def changed(aircraft: Aircraft, change: str) -> Aircraft:
 
 
 def _write_flight(flight: Flight, last: int, step_size: float, log: Recorder, stop: threading.Event) -> int:
-    """Fly to a step and record; the number of the last step."""
+    """Fly to a step and record; the number of steps that were flown."""
     made = StateMessages(flight.aircraft)
     kinds = {
         "/clock": (Clock, STATE_QOS),
@@ -364,7 +361,7 @@ def _write_flight(flight: Flight, last: int, step_size: float, log: Recorder, st
     events = [event for event in flight.events if event.step <= last]
     for event in events:
         keep("/events", event_message(event, step_size), event.step * step_size)
-    flown = 0
+    flown = flight.events[0].step
     try:
         for snapshot in refly(flight.aircraft, events, last, **flight.options):
             if stop.is_set():
@@ -377,7 +374,7 @@ def _write_flight(flight: Flight, last: int, step_size: float, log: Recorder, st
             flown = snapshot.step
     except SbsError as error:
         print(f"the flight ended early: {error}", file=sys.stderr)
-    return flown
+    return flown - flight.events[0].step
 
 
 # --- command line -----------------------------------------------------------------------------------------------
@@ -524,17 +521,18 @@ def _fly_with(options: argparse.Namespace) -> int:
     """Fly the commands again, if they are all there."""
     log = read(options.file)
     flight = flight_of(log)
-    wanted = flight.steps[flight.steps * flight.step_size <= options.end + ROUNDING]
-    last = int(wanted[-1]) if len(wanted) else 0
+    first = flight.events[0].step  # 0 but for a log that was begun in mid-flight
+    wanted = flight.steps[(flight.steps - first) * flight.step_size <= options.end + ROUNDING]
+    last = int(wanted[-1]) if len(wanted) else first
     whole = whole_until(log)
     if last * flight.step_size > whole + ROUNDING:
-        end = math.floor((whole + ROUNDING) * 1e3) * 1e-3
+        end = math.floor((whole - first * flight.step_size + ROUNDING) * 1e3) * 1e-3
         raise RecordingError(f"{log.path} lacks commands after {end:.3f} s: --end {end:.3f} flies those before")
     _tell_if_broken(log)
     stop = threading.Event()  # an exception would be lost in the callbacks of the compiler
     signal.signal(signal.SIGINT, lambda *_: stop.set())
     path, steps = fly_with(flight, options.changes, last, Path(options.output), stop)
-    print(f"{path}: {steps} of {last} steps")
+    print(f"{path}: {steps} of {last - first} steps")
     return 0
 
 

@@ -1,6 +1,7 @@
 """The cockpit: what it draws, in numbers; the page in a real browser with a real simulator behind it."""
 
 import dataclasses
+import http.client
 import io
 import math
 import os
@@ -13,15 +14,22 @@ from pathlib import Path
 import browser
 import numpy as np
 import pytest
+import viser
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, environment, world
+from websockets.datastructures import Headers
+from websockets.exceptions import InvalidStatus
+from websockets.http11 import Request
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
 
-from sbs_msgs.msg import BodyState, FlightEvent
+from sbs_msgs.msg import BodyState, FlightEvent, SimulationStatus
 from sbs_sim import Aircraft, trim
 from sbs_sim.cockpit import geometry
 from sbs_sim.cockpit.charts import PERIOD, History, body_charts, pilot_controls, rotor_charts
+from sbs_sim.cockpit.gate import refusal
 from sbs_sim.cockpit.playback import Recording, recordings
 from sbs_sim.cockpit.poles import Pole, pole_page
 from sbs_sim.cockpit.readouts import Status, condition_here, readout
@@ -30,6 +38,7 @@ from sbs_sim.errors import RecordingError, SimulationError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.multiblade import blade_matrix
+from sbs_sim.nodes.cockpit_node import serve
 from sbs_sim.nodes.conversions import StateMessages, snapshot_of
 from sbs_sim.recording import read
 from sbs_sim.simulation import Simulation, trimmed_state
@@ -147,6 +156,15 @@ def test_the_readout_says_what_the_state_says():
     for part in ("25.00", "10.00", "30.0", "0.98 × real time", "3 deadlines missed", "blade lost", "recording x.mcap"):
         assert part in text
     assert point.thrust.sum() == pytest.approx(20.62 * 9.80665, rel=0.05)
+
+
+def test_the_readout_says_where_the_model_does_not_hold():
+    snapshot, _ = snapshot_of_flight()
+    status = Status(warnings=("rotor 1 <vortex ring>", "rotor 2 stalled"))
+    text = readout(AIRCRAFT, snapshot, status, "sbs")
+    assert "outside the model&#x27;s validity: rotor 1 &lt;vortex ring&gt;" in text
+    assert "rotor 2 stalled" in text
+    assert "validity" not in readout(AIRCRAFT, snapshot, Status(), "sbs")
 
 
 def test_the_history_keeps_instants_apart_and_begins_anew_after_a_jump_back():
@@ -305,6 +323,75 @@ def test_a_wrong_parameter_of_the_simulator_ends_the_cockpit_with_its_line():
     assert any("nonesuch" in line for line in lines)
 
 
+# --- who may fly ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def served():
+    """Address of a page that is served on this machine."""
+    server = serve("127.0.0.1", free_port())
+    try:
+        yield f"127.0.0.1:{server.get_port()}"
+    finally:
+        server.stop()
+
+
+def greeted(place, **headers):
+    """Status with which a WebSocket is answered; its headers are those of viser's page but for those given."""
+    subprotocol = Subprotocol(f"viser-v{viser.__version__}")
+    options = {"additional_headers": headers, "subprotocols": [subprotocol], "proxy": None, "open_timeout": PATIENCE}
+    try:
+        with connect(f"ws://{place}", **options) as client:
+            client.recv(timeout=PATIENCE)  # what the page shows
+            return 101
+    except InvalidStatus as refused:
+        return refused.response.status_code
+
+
+@pytest.mark.parametrize(
+    "origin",
+    ["http://evil.example", "http://127.0.0.1:1", "http://localhost", "null", "http://{}.evil.example", "http://[{}"],
+)
+def test_pages_of_others_cannot_fly(served, origin):
+    assert greeted(served, Origin=origin.format(served)) == 403
+
+
+def test_the_page_itself_and_programs_can(served):
+    assert greeted(served, Origin=f"http://{served}") == 101
+    assert greeted(served) == 101  # no browser: those always tell
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("127.0.0.1:8080", 200),
+        ("localhost:8080", 200),  # a tunnel
+        ("[::1]:8080", 200),
+        ("192.168.1.7:8080", 200),
+        ("evil.example:8080", 403),  # a name that leads here: DNS rebinding
+        ("127.0.0.1.evil.example", 403),
+        ("[:", 403),
+        ("", 403),
+    ],
+)
+def test_the_page_is_there_for_names_of_this_machine_alone(served, host, status):
+    connection = http.client.HTTPConnection(served, timeout=PATIENCE)
+    connection.request("GET", "/", headers={"Host": host})
+    answer = connection.getresponse()
+    assert answer.status == status
+    if status == 200:
+        assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'self'"
+
+
+def test_a_name_that_was_asked_for_is_one_of_this_machine():
+    def asked(name, host):
+        return refusal(Request("/", Headers({"Host": name})), host)
+
+    assert not asked("cockpit.example:8080", "cockpit.example")
+    assert asked("other.example:8080", "cockpit.example")
+    assert not asked(f"{socket.gethostname()}:8080", "0.0.0.0")
+
+
 # --- in a browser -----------------------------------------------------------------------------------------------
 
 
@@ -317,6 +404,7 @@ def flying(tmp_path_factory):
         port = free_port()
         process = made.start("cockpit", arguments=["--port", str(port)])
         made.client.watch("state", BodyState)
+        made.client.watch("status", SimulationStatus)
         made.client.watch("events", FlightEvent, latched=True)
         address = f"http://127.0.0.1:{port}"
         made.client.until(lambda: f"cockpit: {address}" in process.output or not process.running, "the address")
@@ -400,6 +488,18 @@ def test_keys_fly(flying, page):
     made.client.next("events", lambda event: event.kind == FlightEvent.RESET)
 
 
+def test_a_button_ends_the_log_and_begins_another(flying, page):
+    made, _, _ = flying
+    first = made.client.next("status", lambda status: status.log).log
+    button(page, "End recording").click()
+    made.client.next("status", lambda status: not status.log)
+    assert read(first).complete
+    button(page, "Record").click()
+    second = made.client.next("status", lambda status: status.log).log
+    assert second != first
+    button(page, "End recording").wait_for(timeout=1e3 * PATIENCE)
+
+
 def test_linearize_here_shows_the_modes(page):
     button(page, "Linearize here").click()
     page.get_by_role("tab", name="Modes").click()
@@ -435,5 +535,6 @@ def test_its_end_is_the_simulators_end(flying):
     while any(Path(f"/proc/{child}").exists() for child in children) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not any(Path(f"/proc/{child}").exists() for child in children)
-    [log] = (made.folder / "bags").glob("*_sbs.mcap")
-    assert read(log).complete
+    logs = list((made.folder / "bags").glob("*_sbs*.mcap"))
+    assert len(logs) == 2
+    assert all(read(log).complete for log in logs)

@@ -35,6 +35,8 @@ class Status:
         Path; empty if nothing is recorded.
     log_state : str
         What is wrong with the recording; empty if nothing is.
+    warnings : tuple of str
+        Where the model does not hold.
     """
 
     playing: bool = False
@@ -43,6 +45,7 @@ class Status:
     fault: str = ""
     log: str = ""
     log_state: str = ""
+    warnings: tuple[str, ...] = ()
 
 
 def condition_here(snapshot: Snapshot) -> TrimCondition:
@@ -137,5 +140,6 @@ def _state_line(status: Status, source: str) -> str:
     lines = [f"<b>{escape(source)}</b> {doing}{late}"]
     if status.log:
         lines.append(f'<span style="color:#5c6670">recording {escape(Path(status.log).name)}</span>')
-    lines += [f'<span style="color:#D55E00">{escape(text)}</span>' for text in (status.fault, status.log_state) if text]
+    told = (status.fault, status.log_state, *(f"outside the model's validity: {text}" for text in status.warnings))
+    lines += [f'<span style="color:#D55E00">{escape(text)}</span>' for text in told if text]
     return f'<div style="margin-top:4px;line-height:1.4">{"<br>".join(lines)}</div>'

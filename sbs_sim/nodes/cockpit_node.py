@@ -20,6 +20,7 @@ from viser import ViserServer
 
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, LinearModel, RotorStateArray, SimulationStatus
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.cockpit.gate import guarded
 from sbs_sim.cockpit.poles import Pole
 from sbs_sim.cockpit.readouts import Status
 from sbs_sim.cockpit.view import FRAME_PERIOD, Live, View
@@ -160,6 +161,7 @@ def _status(told: SimulationStatus) -> Status:
         told.fault,
         told.log,
         f"{lost}{told.log_fault}".strip(),
+        tuple(told.warnings),
     )
 
 
@@ -171,9 +173,10 @@ def _poles(model: LinearModel) -> tuple[list[Pole], str]:
 
 
 def serve(host: str, port: int) -> ViserServer:
-    """Server of the page, which says nothing of itself and is not to be shared through another machine."""
+    """Server of the page, which says nothing of itself, is not to be shared through another machine, and is guarded."""
     rich.get_console().quiet = True  # viser prints through it
-    server = ViserServer(host, port, verbose=False)
+    with guarded(host):
+        server = ViserServer(host, port, verbose=False)
     server.request_share_url = lambda verbose=True: None  # a page could ask for it
     if server.get_port() != port:  # viser goes on to the next port that is free
         server.stop()

@@ -32,7 +32,7 @@ from sbs_sim.cockpit.charts import PERIOD, History, body_charts, pilot_controls,
 from sbs_sim.cockpit.gate import refusal
 from sbs_sim.cockpit.playback import Recording, recordings
 from sbs_sim.cockpit.poles import Pole, pole_page
-from sbs_sim.cockpit.readouts import Status, condition_here, readout
+from sbs_sim.cockpit.readouts import Status, condition_here, readout, source_line
 from sbs_sim.cockpit.scene import COLOURS, colour_of
 from sbs_sim.errors import RecordingError, SimulationError
 from sbs_sim.model import state as S
@@ -291,6 +291,7 @@ def end_of_cockpit(*arguments, domain=0):
         (["--port", "x"], "--port: invalid int value: 'x'"),
         (["--host", ""], "--host is empty"),
         (["--fly"], "--fly"),
+        (["--logs"], "--logs: expected one argument"),
     ],
 )
 def test_a_wrong_command_line_is_told(arguments, told):
@@ -314,6 +315,20 @@ def test_a_host_that_is_not_this_machine_is_told_in_one_line():
     assert code == 1
     assert len(lines) == 1
     assert "192.0.2.1" in lines[0]
+
+
+def test_a_folder_that_is_not_there_is_told_in_one_line(tmp_path):
+    code, lines = end_of_cockpit("--logs", str(tmp_path / "none"), "--port", str(free_port()), domain=next(DOMAINS))
+    assert (code, lines) == (1, [f"--logs {tmp_path / 'none'}: allowed is a folder with logs"])
+
+
+def test_the_page_says_what_it_shows():
+    assert "LIVE" in source_line("", True)
+    assert "NO SIMULATOR" in source_line("", False)
+    for flying, text in ((True, "a live flight goes on"), (False, "no simulator")):
+        line = source_line("a<b.mcap", flying)
+        assert "LOG" in line
+        assert f"a&lt;b.mcap, {text}" in line
 
 
 def test_a_wrong_parameter_of_the_simulator_ends_the_cockpit_with_its_line():
@@ -524,6 +539,40 @@ def test_a_log_that_is_none_is_refused_and_the_view_stays(flying, page):
     page.get_by_role("option", name="broken.mcap").click()
     page.get_by_text("Log refused").wait_for(timeout=1e3 * PATIENCE)
     assert page.get_by_text("hover_step.mcap paused").count() == 1
+
+
+def test_logs_are_shown_without_a_simulator_and_a_live_flight_when_there_is_one(tmp_path, page):
+    logs = tmp_path / "mine"
+    logs.mkdir()
+    (logs / "hover_step.mcap").write_bytes(HOVER_STEP.read_bytes())
+    size = dict(zip(("width", "height"), browser.SIZE, strict=True))
+    with world(next(DOMAINS), tmp_path) as made, page.context.browser.new_page(viewport=size) as other:
+        port = free_port()
+        cockpit = made.start("cockpit", arguments=["--logs", str(logs), "--port", str(port)])
+        made.client.until(lambda: "cockpit: http" in cockpit.output or not cockpit.running, "the address")
+        other.goto(f"http://127.0.0.1:{port}")
+
+        def shown(text):
+            other.get_by_text(text).first.wait_for(timeout=1e3 * PATIENCE)
+
+        def choose(source):
+            other.get_by_label("Source").click()
+            other.get_by_role("option", name=source).click()
+
+        shown("NO SIMULATOR")
+        shown("No simulator flies")
+        other.get_by_role("tab", name="Logs").click()
+        choose("hover_step.mcap")
+        shown("hover_step.mcap, no simulator")
+        shown("hover_step.mcap paused")  # at its end
+        simulator = made.start("simulator", record="off")
+        shown("hover_step.mcap, a live flight goes on")
+        choose("live")
+        shown("LIVE")
+        shown("sbs playing")
+        assert simulator.interrupt() == 0
+        shown("NO SIMULATOR")
+        assert cockpit.interrupt() == 0, cockpit.output
 
 
 def test_its_end_is_the_simulators_end(flying):

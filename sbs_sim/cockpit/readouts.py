@@ -102,6 +102,26 @@ def readout(aircraft: Aircraft, snapshot: Snapshot, status: Status, source: str)
     )
 
 
+def source_line(log: str, flying: bool) -> str:
+    """What the page shows: a live flight, a log of a name, or nothing; and whether a simulator is there.
+
+    Parameters
+    ----------
+    log : str
+        Name of the log that is shown; empty for none.
+    flying : bool
+        A simulator is there.
+    """
+    word, colour, more = ("LIVE", "#009E73", "") if flying else ("NO SIMULATOR", "#D55E00", "")
+    if log:
+        word, colour, more = "LOG", "#0072B2", f"{log}, {'a live flight goes on' if flying else 'no simulator'}"
+    mark = f"color:white;background:{colour};padding:1px 6px;border-radius:3px"
+    return (
+        '<div style="font:12px sans-serif;padding:6px 10px 0 10px">'
+        f'<b style="{mark}">{word}</b> <span style="color:#5c6670">{escape(more)}</span></div>'
+    )
+
+
 def _fixed(value: float) -> str:
     """Number with two decimals, without a minus before zeros."""
     return f"{round(float(value), 2) + 0.0:.2f}"

@@ -28,6 +28,7 @@ from ros_harness import (  # noqa: E402
 )
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
+from terminal import on_a_terminal  # noqa: E402
 
 from sbs_msgs.msg import (  # noqa: E402
     BodyState,
@@ -655,6 +656,33 @@ def test_replay_again_and_again_until_it_is_ended(tmp_path, recorded):
             assert process.wait(PATIENCE) == 0
         finally:
             process.kill()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "unit"),
+    [
+        (["--verify"], "state"),
+        (["--with", "body.mass=21", "--output", "new.mcap"], "step"),
+        (["--recover"], "chunk"),
+        (["--rate", "100", "--topics", "inflow"], "s/s"),
+    ],
+    ids=lambda given: given[0] if isinstance(given, list) else "",
+)
+def test_it_shows_how_far_it_is_on_a_terminal_only(tmp_path, arguments, unit):
+    log, domain = tmp_path / "a.mcap", next(DOMAINS)
+    log.write_bytes(HOVER_STEP.read_bytes())
+    command = [sys.executable, str(EXECUTABLES / "replay"), str(log), *arguments]
+    code, out, shown = on_a_terminal(command, cwd=tmp_path, env=environment(domain))
+    assert code == 0, shown
+    assert "%|" in shown.decode()
+    assert unit in shown.decode()
+    assert "%|" not in out
+    for made in ("new.mcap", "a.recovered.mcap"):
+        (tmp_path / made).unlink(missing_ok=True)
+    silent = subprocess.run(
+        command, cwd=tmp_path, env=environment(domain), capture_output=True, text=True, timeout=PATIENCE, check=True
+    )
+    assert "%|" not in silent.stderr
 
 
 @pytest.mark.parametrize(

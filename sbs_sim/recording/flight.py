@@ -4,7 +4,7 @@ import io
 import itertools
 import math
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -276,8 +276,14 @@ def _common(*times: IntArray) -> tuple[IntArray, list[IntArray]]:
 # --- flown again ------------------------------------------------------------------------------------------------
 
 
-def verify(flight: Flight) -> Verification:
+def verify(flight: Flight, progress: Callable[[float, float], None] | None = None) -> Verification:
     """Fly a recorded flight again and compare every recorded state, bit for bit.
+
+    Parameters
+    ----------
+    flight : Flight
+    progress : callable, optional
+        Called with the number of states that have been compared and of all of them.
 
     Raises
     ------
@@ -291,6 +297,8 @@ def verify(flight: Flight) -> Verification:
     largest: Difference | None = None
     scale = np.maximum(np.abs(flight.states).max(axis=0), 1e-12)
     for i, flown in _beside(flight, refly(flight.aircraft, flight.events, int(flight.steps[-1]), **flight.options)):
+        if progress is not None:
+            progress(i + 1, len(flight.states))
         logged = flight.states[i]
         if logged.tobytes() == flown.state.tobytes():
             continue

@@ -200,6 +200,10 @@ class FlightLoop:
         """Set the wind that `make` gives for the present instant, from the next tick on."""
         self.call(lambda: self._set_wind(make))
 
+    def begin_log(self) -> None:
+        """Hand out the present as a start, and as a snapshot: what a log that begins now has to begin with."""
+        self.call(self._begin_log)
+
     def wind(self) -> Wind:
         """The wind in force."""
         return self._simulation.wind
@@ -351,6 +355,10 @@ class FlightLoop:
         self._fault = ""
         self._commands.clear()
         self._command_time = None
+        self._report(patient=self._as_fast_as_read)
+
+    def _begin_log(self) -> None:
+        self._events.append(self._simulation.beginning())
         self._report(patient=self._as_fast_as_read)
 
     @property

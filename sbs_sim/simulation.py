@@ -42,6 +42,7 @@ AZIMUTH_STEPS = (math.radians(0.01), math.radians(45.0))  # rad
 
 # A tick is one uninterrupted call of compiled code; this many steps take it a tenth of a second.
 MOST_STEPS_PER_TICK = 10_000
+MOST_WIND_TICKS = 1_000_000_000  # that turbulence is brought forward by for a log that begins in mid-flight: minutes
 BLOCK = 1000  # ticks that whole flights take in one call
 
 # Beyond these magnitudes a state is not plausible and the simulation stops. The angles and the inflow are far outside
@@ -128,6 +129,11 @@ class Event:
         [rad]
     state : ndarray, shape (size,), or None
     wind : Wind or None
+    wind_step : int
+        Of a start: integration steps before its wind was set, which is earlier than the start where a log begins in
+        mid-flight.
+    wind_ticks : int
+        Of a start: ticks of its wind that have begun; 0 for one that is new.
     """
 
     step: int
@@ -135,6 +141,8 @@ class Event:
     swashplate: Array | None = None
     state: Array | None = None
     wind: Wind | None = None
+    wind_step: int = 0
+    wind_ticks: int = 0
 
 
 class Simulation:
@@ -233,7 +241,22 @@ class Simulation:
 
     def beginning(self) -> Event:
         """The present as the start of a flight."""
-        return Event(self.step, "start", self.swashplate.copy(), self.state.copy(), self.wind)
+        swashplate, state = self.swashplate.copy(), self.state.copy()
+        return Event(self.step, "start", swashplate, state, self.wind, self._wind_step, self._field.ticks)
+
+    def go_on_from(self, start: Event) -> None:
+        """Take step, and with it time and azimuths, and the age of the wind from the start of a log.
+
+        Raises
+        ------
+        SimulationError
+            The start is before its wind, or long after it.
+        """
+        checks.whole("wind_step", start.wind_step, 0, start.step, SimulationError)
+        checks.whole("wind_ticks", start.wind_ticks, 0, MOST_WIND_TICKS, SimulationError)
+        self.step, self._wind_step = start.step, start.wind_step
+        self._field = WindField(self.wind, start.wind_step * self.step_size, self.tick)
+        self._air = self._field.tick_number(max(1, start.wind_ticks))
 
     def act(self, event: Event) -> None:
         """Let an event act; one with a state resets.
@@ -309,6 +332,7 @@ class Simulation:
     def set_wind(self, wind: Wind) -> None:
         """Set the wind from the next tick on; gust delays count from now."""
         checks.instance("wind", wind, Wind, SimulationError)
+        self._wind_step = self.step
         self._field = WindField(wind, self.time, self.tick)
         self._air = self._field.next_tick()
 
@@ -459,6 +483,30 @@ class Simulation:
         return rows
 
 
+def begun(aircraft: Aircraft, events: Sequence[Event], **options: Any) -> Simulation:
+    """Simulation at the start of a flight, also of one that had flown before its log began.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    events : sequence of Event
+        The first is the start.
+    **options :
+        Those of `Simulation` but for the wind.
+
+    Raises
+    ------
+    SimulationError
+        The events do not begin with a start, or one that is not possible.
+    """
+    start = events[0] if events else None
+    if start is None or start.kind != "start" or start.state is None or start.swashplate is None:
+        raise SimulationError("events: the first must be the start of the flight")
+    simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **options)
+    simulation.go_on_from(start)
+    return simulation
+
+
 def refly(aircraft: Aircraft, events: Sequence[Event], last_step: int, **options: Any) -> Iterator[Snapshot]:
     """Fly a flight again from the events of the first one.
 
@@ -482,10 +530,7 @@ def refly(aircraft: Aircraft, events: Sequence[Event], last_step: int, **options
     SimulationError
         The events do not begin with a start, or the flight cannot go on and no reset follows.
     """
-    start, waiting = events[0] if events else None, collections.deque(events[1:])
-    if start is None or start.kind != "start" or start.state is None or start.swashplate is None:
-        raise SimulationError("events: the first must be the start of the flight")
-    simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **options)
+    simulation, waiting = begun(aircraft, events, **options), collections.deque(events[1:])
     yield simulation.snapshot()
     fault: SimulationError | None = None
     while simulation.step < last_step or (waiting and waiting[0].step <= simulation.step):

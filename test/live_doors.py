@@ -44,7 +44,7 @@ from sbs_msgs.msg import (
     SimulationStatus,
     SwashplateArray,
 )
-from sbs_msgs.srv import Linearize, Reset, SetWind, Step, Trim
+from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim
 from sbs_sim.model.state import CONTROL_NAMES
 
 SERVICES = {
@@ -52,6 +52,7 @@ SERVICES = {
     "step": Step,
     "reset": Reset,
     "set_wind": SetWind,
+    "record": Record,
     "trim": Trim,
     "linearize": Linearize,
     "simulator/set_parameters": SetParameters,

@@ -1,6 +1,7 @@
 """The cockpit: what it draws, in numbers; the page in a real browser with a real simulator behind it."""
 
 import dataclasses
+import http.client
 import io
 import math
 import os
@@ -18,23 +19,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, environment, world
-from websockets.exceptions import ConnectionClosed
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.http11 import Request
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from sbs_msgs.msg import BodyState, FlightEvent
+from sbs_msgs.msg import BodyState, FlightEvent, SimulationStatus
 from sbs_sim import Aircraft, trim
 from sbs_sim.cockpit import geometry
 from sbs_sim.cockpit.charts import PERIOD, History, body_charts, pilot_controls, rotor_charts
+from sbs_sim.cockpit.gate import refusal
 from sbs_sim.cockpit.playback import Recording, recordings
 from sbs_sim.cockpit.poles import Pole, pole_page
-from sbs_sim.cockpit.readouts import Status, condition_here, readout
+from sbs_sim.cockpit.readouts import Status, condition_here, readout, source_line
 from sbs_sim.cockpit.scene import COLOURS, colour_of
 from sbs_sim.errors import RecordingError, SimulationError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.multiblade import blade_matrix
-from sbs_sim.nodes.cockpit_node import is_own_page
+from sbs_sim.nodes.cockpit_node import serve
 from sbs_sim.nodes.conversions import StateMessages, snapshot_of
 from sbs_sim.recording import read
 from sbs_sim.simulation import Simulation, trimmed_state
@@ -152,6 +156,15 @@ def test_the_readout_says_what_the_state_says():
     for part in ("25.00", "10.00", "30.0", "0.98 × real time", "3 deadlines missed", "blade lost", "recording x.mcap"):
         assert part in text
     assert point.thrust.sum() == pytest.approx(20.62 * 9.80665, rel=0.05)
+
+
+def test_the_readout_says_where_the_model_does_not_hold():
+    snapshot, _ = snapshot_of_flight()
+    status = Status(warnings=("rotor 1 <vortex ring>", "rotor 2 stalled"))
+    text = readout(AIRCRAFT, snapshot, status, "sbs")
+    assert "outside the model&#x27;s validity: rotor 1 &lt;vortex ring&gt;" in text
+    assert "rotor 2 stalled" in text
+    assert "validity" not in readout(AIRCRAFT, snapshot, Status(), "sbs")
 
 
 def test_the_history_keeps_instants_apart_and_begins_anew_after_a_jump_back():
@@ -298,6 +311,7 @@ def end_of_cockpit(*arguments, domain=0):
         (["--port", "x"], "--port: invalid int value: 'x'"),
         (["--host", ""], "--host is empty"),
         (["--fly"], "--fly"),
+        (["--logs"], "--logs: expected one argument"),
     ],
 )
 def test_a_wrong_command_line_is_told(arguments, told):
@@ -323,6 +337,20 @@ def test_a_host_that_is_not_this_machine_is_told_in_one_line():
     assert "192.0.2.1" in lines[0]
 
 
+def test_a_folder_that_is_not_there_is_told_in_one_line(tmp_path):
+    code, lines = end_of_cockpit("--logs", str(tmp_path / "none"), "--port", str(free_port()), domain=next(DOMAINS))
+    assert (code, lines) == (1, [f"--logs {tmp_path / 'none'}: allowed is a folder with logs"])
+
+
+def test_the_page_says_what_it_shows():
+    assert "LIVE" in source_line("", True)
+    assert "NO SIMULATOR" in source_line("", False)
+    for flying, text in ((True, "a live flight goes on"), (False, "no simulator")):
+        line = source_line("a<b.mcap", flying)
+        assert "LOG" in line
+        assert f"a&lt;b.mcap, {text}" in line
+
+
 def test_a_wrong_parameter_of_the_simulator_ends_the_cockpit_with_its_line():
     arguments = ("--port", str(free_port()), "--ros-args", "-p", "aircraft:=nonesuch")
     code, lines = end_of_cockpit(*arguments, domain=next(DOMAINS))
@@ -330,23 +358,73 @@ def test_a_wrong_parameter_of_the_simulator_ends_the_cockpit_with_its_line():
     assert any("nonesuch" in line for line in lines)
 
 
+# --- who may fly ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def served():
+    """Address of a page that is served on this machine."""
+    server = serve("127.0.0.1", free_port())
+    try:
+        yield f"127.0.0.1:{server.get_port()}"
+    finally:
+        server.stop()
+
+
+def greeted(place, **headers):
+    """Status with which a WebSocket is answered; its headers are those of viser's page but for those given."""
+    subprotocol = Subprotocol(f"viser-v{viser.__version__}")
+    options = {"additional_headers": headers, "subprotocols": [subprotocol], "proxy": None, "open_timeout": PATIENCE}
+    try:
+        with connect(f"ws://{place}", **options) as client:
+            client.recv(timeout=PATIENCE)  # what the page shows
+            return 101
+    except InvalidStatus as refused:
+        return refused.response.status_code
+
+
 @pytest.mark.parametrize(
-    ("origin", "asked", "host", "own"),
+    "origin",
+    ["http://evil.example", "http://127.0.0.1:1", "http://localhost", "null", "http://{}.evil.example", "http://[{}"],
+)
+def test_pages_of_others_cannot_fly(served, origin):
+    assert greeted(served, Origin=origin.format(served)) == 403
+
+
+def test_the_page_itself_and_programs_can(served):
+    assert greeted(served, Origin=f"http://{served}") == 101
+    assert greeted(served) == 101  # no browser: those always tell
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
     [
-        (None, "127.0.0.1:8080", "127.0.0.1", True),  # no browser
-        ("http://127.0.0.1:8080", "127.0.0.1:8080", "127.0.0.1", True),
-        ("http://localhost:9000", "localhost:9000", "127.0.0.1", True),  # through a tunnel
-        ("http://[::1]:8080", "[::1]:8080", "localhost", True),
-        ("http://example.org", "127.0.0.1:8080", "127.0.0.1", False),
-        ("null", "127.0.0.1:8080", "127.0.0.1", False),  # a file, a frame without rights
-        ("http://127.0.0.1:9000", "127.0.0.1:8080", "127.0.0.1", False),
-        ("http://example.org:8080", "example.org:8080", "127.0.0.1", False),  # a name that points to this machine
-        ("http://cockpit.example.org:8080", "cockpit.example.org:8080", "0.0.0.0", True),
-        ("http://example.org", "cockpit.example.org:8080", "0.0.0.0", False),
+        ("127.0.0.1:8080", 200),
+        ("localhost:8080", 200),  # a tunnel
+        ("[::1]:8080", 200),
+        ("192.168.1.7:8080", 200),
+        ("evil.example:8080", 403),  # a name that leads here: DNS rebinding
+        ("127.0.0.1.evil.example", 403),
+        ("[:", 403),
+        ("", 403),
     ],
 )
-def test_only_the_cockpits_own_page_may_fly(origin, asked, host, own):
-    assert is_own_page(origin, asked, host) is own
+def test_the_page_is_there_for_names_of_this_machine_alone(served, host, status):
+    connection = http.client.HTTPConnection(served, timeout=PATIENCE)
+    connection.request("GET", "/", headers={"Host": host})
+    answer = connection.getresponse()
+    assert answer.status == status
+    if status == 200:
+        assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'self'"
+
+
+def test_a_name_that_was_asked_for_is_one_of_this_machine():
+    def asked(name, host):
+        return refusal(Request("/", Headers({"Host": name})), host)
+
+    assert not asked("cockpit.example:8080", "cockpit.example")
+    assert asked("other.example:8080", "cockpit.example")
+    assert not asked(f"{socket.gethostname()}:8080", "0.0.0.0")
 
 
 # --- in a browser -----------------------------------------------------------------------------------------------
@@ -361,6 +439,7 @@ def flying(tmp_path_factory):
         port = free_port()
         process = made.start("cockpit", arguments=["--port", str(port)])
         made.client.watch("state", BodyState)
+        made.client.watch("status", SimulationStatus)
         made.client.watch("events", FlightEvent, latched=True)
         address = f"http://127.0.0.1:{port}"
         made.client.until(lambda: f"cockpit: {address}" in process.output or not process.running, "the address")
@@ -455,6 +534,18 @@ def test_keys_fly(flying, page):
     made.client.next("events", lambda event: event.kind == FlightEvent.RESET)
 
 
+def test_a_button_ends_the_log_and_begins_another(flying, page):
+    made, _, _ = flying
+    first = made.client.next("status", lambda status: status.log).log
+    button(page, "End recording").click()
+    made.client.next("status", lambda status: not status.log)
+    assert read(first).complete
+    button(page, "Record").click()
+    second = made.client.next("status", lambda status: status.log).log
+    assert second != first
+    button(page, "End recording").wait_for(timeout=1e3 * PATIENCE)
+
+
 def test_linearize_here_shows_the_modes(page):
     button(page, "Linearize here").click()
     page.get_by_role("tab", name="Modes").click()
@@ -481,6 +572,40 @@ def test_a_log_that_is_none_is_refused_and_the_view_stays(flying, page):
     assert page.get_by_text("hover_step.mcap paused").count() == 1
 
 
+def test_logs_are_shown_without_a_simulator_and_a_live_flight_when_there_is_one(tmp_path, page):
+    logs = tmp_path / "mine"
+    logs.mkdir()
+    (logs / "hover_step.mcap").write_bytes(HOVER_STEP.read_bytes())
+    size = dict(zip(("width", "height"), browser.SIZE, strict=True))
+    with world(next(DOMAINS), tmp_path) as made, page.context.browser.new_page(viewport=size) as other:
+        port = free_port()
+        cockpit = made.start("cockpit", arguments=["--logs", str(logs), "--port", str(port)])
+        made.client.until(lambda: "cockpit: http" in cockpit.output or not cockpit.running, "the address")
+        other.goto(f"http://127.0.0.1:{port}")
+
+        def shown(text):
+            other.get_by_text(text).first.wait_for(timeout=1e3 * PATIENCE)
+
+        def choose(source):
+            other.get_by_label("Source").click()
+            other.get_by_role("option", name=source).click()
+
+        shown("NO SIMULATOR")
+        shown("No simulator flies")
+        other.get_by_role("tab", name="Logs").click()
+        choose("hover_step.mcap")
+        shown("hover_step.mcap, no simulator")
+        shown("hover_step.mcap paused")  # at its end
+        simulator = made.start("simulator", record="off")
+        shown("hover_step.mcap, a live flight goes on")
+        choose("live")
+        shown("LIVE")
+        shown("sbs playing")
+        assert simulator.interrupt() == 0
+        shown("NO SIMULATOR")
+        assert cockpit.interrupt() == 0, cockpit.output
+
+
 def test_its_end_is_the_simulators_end(flying):
     made, process, _ = flying
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
@@ -490,5 +615,6 @@ def test_its_end_is_the_simulators_end(flying):
     while any(Path(f"/proc/{child}").exists() for child in children) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not any(Path(f"/proc/{child}").exists() for child in children)
-    [log] = (made.folder / "bags").glob("*_sbs.mcap")
-    assert read(log).complete
+    logs = list((made.folder / "bags").glob("*_sbs*.mcap"))
+    assert len(logs) == 2
+    assert all(read(log).complete for log in logs)

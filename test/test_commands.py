@@ -1,23 +1,19 @@
 """The executables trim, linearize and sweep as real processes: what they print, write, and end with."""
 
 import csv
-import fcntl
 import json
 import math
-import os
-import pty
 import re
 import signal
-import struct
 import subprocess
 import sys
-import termios
 import time
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
+from terminal import on_a_terminal
 
 from sbs_sim import linearize, trim
 
@@ -210,23 +206,8 @@ def test_a_sweep_without_any_trim_fails():
 
 
 def test_a_bar_is_shown_on_a_terminal_only():
-    master, slave = pty.openpty()
-    fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
-    with subprocess.Popen(
-        command("sweep", "airspeed", 0, 5, 3, "--trims-only"), stdout=subprocess.PIPE, stderr=slave
-    ) as process:
-        os.close(slave)
-        out = process.stdout.read().decode()
-        process.wait(PATIENCE)
-    shown = b""
-    # the other end is closed: what comes is what there is
-    while True:
-        try:
-            shown += os.read(master, 4096)
-        except OSError:
-            break
-    os.close(master)
-    assert process.returncode == 0
+    code, out, shown = on_a_terminal(command("sweep", "airspeed", 0, 5, 3, "--trims-only"))
+    assert code == 0
     assert b"0/3 [" in shown
     assert shown.rstrip(b"\r").endswith(b" ")  # and cleared
     assert "/3 [" not in out

@@ -15,7 +15,7 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy")
 
-from geometry_msgs.msg import Vector3  # noqa: E402
+from geometry_msgs.msg import Point, Vector3  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
 from ros_harness import (  # noqa: E402
     DOMAINS,
@@ -28,6 +28,7 @@ from ros_harness import (  # noqa: E402
 )
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
+from terminal import on_a_terminal  # noqa: E402
 
 from sbs_msgs.msg import (  # noqa: E402
     BodyState,
@@ -39,7 +40,7 @@ from sbs_msgs.msg import (  # noqa: E402
     SwashplateArray,
     TrimPoint,
 )
-from sbs_msgs.srv import Reset, SetWind, Step, Trim  # noqa: E402
+from sbs_msgs.srv import Record, Reset, SetWind, Step, Trim  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.recording import read, recover  # noqa: E402
 from sbs_sim.recording.flight import whole_until  # noqa: E402
@@ -290,6 +291,109 @@ def test_pause_steps_resets_and_wind_come_again_bit_for_bit(tmp_path, hover):
         wiggle(made, hover, 0.3)
 
     assert_identical(fly(tmp_path, act))
+
+
+# -- recording in flight -----------------------------------------------------------------------------------------------
+
+
+def test_logs_begun_in_mid_flight_come_again_bit_for_bit(tmp_path, hover):
+    """Turbulence and a gust have begun before the log; the azimuths stand anywhere."""
+    first, second = tmp_path / "first.mcap", tmp_path / "second.mcap"
+    with world(next(DOMAINS), tmp_path) as made:
+        client = made.client
+        client.watch("status", SimulationStatus)
+        events = client.watch("events", FlightEvent, latched=True)
+        simulator = made.start("simulator", record="off")
+        assert client.next("status").log == ""
+        gust = {"gust": Vector3(z=2.0), "gust_delay": 0.2, "gust_duration": 5.0}
+        assert client.call(SetWind, "set_wind", **gust, **turbulence(3)).success
+        wiggle(made, hover, 0.4)
+        answer = client.call(Record, "record", record=True, path=str(first))
+        assert (answer.success, answer.path) == (True, str(first)), answer.message
+        assert client.next("status", lambda status: status.log).log == str(first)
+        wiggle(made, hover, 0.5)
+        ended = client.call(Record, "record", record=False)
+        assert (ended.success, ended.path) == (True, str(first)), ended.message
+        assert read(first).complete  # as soon as it is said to have ended
+        client.next("status", lambda status: not status.log)
+        wiggle(made, hover, 0.2)
+        assert client.call(Record, "record", record=True, path=str(second)).success
+        wiggle(made, hover, 0.4)
+        assert simulator.interrupt() == 0, simulator.output
+    assert [event.kind for event in events].count("start") == 1  # for everybody else the flight has begun once
+    for path in (first, second):
+        log = read(path)
+        assert log.complete
+        assert log["events"]["kind"][0] == "start"
+        assert log["events"]["step"][0] > 0
+        assert log["events"]["wind_ticks"][0] > 20
+        assert log["state"].time[0] == pytest.approx(log["events"].time[0])
+        assert "swashplate" in log["events"]["kind"]
+        assert_identical(path)
+    assert read(second)["state"].time[0] > read(first)["state"].time[-1]
+
+
+def test_a_log_that_begins_while_paused_after_a_fault_comes_again(tmp_path):
+    """The flight has ended at the ground within a tick; a reset flies on."""
+    path = tmp_path / "late.mcap"
+    with world(next(DOMAINS), tmp_path) as made:
+        client = made.client
+        client.watch("status", SimulationStatus)
+        simulator = made.start("simulator", record="off", ground_altitude=-0.6)
+        assert client.call(SetWind, "set_wind", velocity=Vector3(z=5.0), **turbulence(4)).success
+        client.next("status", lambda status: "ground contact" in status.fault)
+        assert client.call(Record, "record", record=True, path=str(path)).success
+        assert client.call(Reset, "reset", position=Point(z=-20.0)).success
+        assert client.call(SetBool, "pause", data=False).success
+        late = client.next("status", lambda status: not status.fault and status.state == SimulationStatus.PLAYING)
+        client.next("status", lambda status: status.sim_time > late.sim_time + 0.4)
+        assert simulator.interrupt() == 0, simulator.output
+    assert_identical(path)
+
+
+def test_a_log_begun_in_mid_flight_flies_with_a_changed_aircraft(tmp_path, hover):
+    path, heavy = tmp_path / "mid.mcap", tmp_path / "heavy.mcap"
+    with world(next(DOMAINS), tmp_path) as made:
+        made.client.watch("status", SimulationStatus)
+        made.start("simulator", record="off")
+        made.client.next("status", lambda status: status.sim_time > 0.3)
+        assert made.client.call(Record, "record", record=True, path=str(path)).success
+        wiggle(made, hover, 0.5)
+        assert made.client.call(Record, "record", record=False).success
+    found = replay("--with", "body.mass=22.5", "--output", heavy, "--end", 0.3, path)
+    assert found.returncode == 0, found.stderr
+    assert "of 0 steps" not in found.stdout
+    log, begin = read(heavy), read(path)["state"].time[0]
+    assert log["state"].time[0] == begin
+    assert log["state"].time[-1] == pytest.approx(begin + 0.3, abs=0.011)
+    assert_identical(heavy)
+
+
+def test_what_cannot_be_recorded_is_refused_in_one_line_and_changes_nothing(tmp_path):
+    (tmp_path / "there.mcap").write_bytes(b"mine")
+    with world(next(DOMAINS), tmp_path) as made:
+        client = made.client
+        client.watch("status", SimulationStatus)
+        made.start("simulator", record="off")
+        client.next("status")
+
+        def refusal(**request):
+            answer = client.call(Record, "record", **request)
+            assert not answer.success
+            assert len(answer.message.splitlines()) == 1
+            return answer.message
+
+        assert refusal(record=False) == "record = false: nothing is recorded"
+        assert "there.mcap: File exists" in refusal(record=True, path=str(tmp_path / "there.mcap"))
+        assert (tmp_path / "there.mcap").read_bytes() == b"mine"
+        assert "does not exist" in refusal(record=True, path=str(tmp_path / "none" / "a.mcap"))
+        assert "Permission denied" in refusal(record=True, path="/sys/a.mcap")
+        answer = client.call(Record, "record", record=True, path=str(tmp_path))  # a folder
+        assert answer.success
+        assert Path(answer.path).parent == tmp_path
+        assert refusal(record=True) == f"recording {answer.path} already: record = false ends it"
+        assert client.next("status").log == answer.path
+    assert set(tmp_path.rglob("*.mcap")) == {tmp_path / "there.mcap", Path(answer.path)}
 
 
 def test_a_flight_as_fast_as_it_goes_comes_again_and_nothing_is_left_out(tmp_path, hover):
@@ -552,6 +656,33 @@ def test_replay_again_and_again_until_it_is_ended(tmp_path, recorded):
             assert process.wait(PATIENCE) == 0
         finally:
             process.kill()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "unit"),
+    [
+        (["--verify"], "state"),
+        (["--with", "body.mass=21", "--output", "new.mcap"], "step"),
+        (["--recover"], "chunk"),
+        (["--rate", "100", "--topics", "inflow"], "s/s"),
+    ],
+    ids=lambda given: given[0] if isinstance(given, list) else "",
+)
+def test_it_shows_how_far_it_is_on_a_terminal_only(tmp_path, arguments, unit):
+    log, domain = tmp_path / "a.mcap", next(DOMAINS)
+    log.write_bytes(HOVER_STEP.read_bytes())
+    command = [sys.executable, str(EXECUTABLES / "replay"), str(log), *arguments]
+    code, out, shown = on_a_terminal(command, cwd=tmp_path, env=environment(domain))
+    assert code == 0, shown
+    assert "%|" in shown.decode()
+    assert unit in shown.decode()
+    assert "%|" not in out
+    for made in ("new.mcap", "a.recovered.mcap"):
+        (tmp_path / made).unlink(missing_ok=True)
+    silent = subprocess.run(
+        command, cwd=tmp_path, env=environment(domain), capture_output=True, text=True, timeout=PATIENCE, check=True
+    )
+    assert "%|" not in silent.stderr
 
 
 @pytest.mark.parametrize(

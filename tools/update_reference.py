@@ -32,6 +32,7 @@ NODES = {
     "outputs": ("simulator",),
     "control_mixer": ("control_mixer",),
     "analysis": ("analysis",),
+    "recording": ("recorder",),
     "pilot": PILOTS,
     "hover_hold": ("hover_hold",),
     "joystick": ("joystick",),

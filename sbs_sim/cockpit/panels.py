@@ -11,6 +11,7 @@ from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimCondition
+from sbs_sim.cockpit.charts import pilot_controls
 from sbs_sim.cockpit.scene import Shown
 from sbs_sim.model.state import CONTROL_NAMES
 
@@ -29,8 +30,9 @@ HINTS = (
 )
 # One key for less and one for more of each control; they lie together, apart from those that move the camera.
 KEYS = (("H", "Y"), ("J", "L"), ("K", "I"), ("O", "U"))
-LIVE = "live"
+LIVE, NOTHING = "live", "choose a log"
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
+RECORD, END_RECORD = "Record", "End recording"
 
 
 class Pilot(Protocol):
@@ -53,6 +55,9 @@ class Pilot(Protocol):
 
     def set_wind(self, velocity: Array, turbulence: float) -> Answer:
         """Steady wind, NED [m/s], shape (3,), and standard deviation of turbulence in all directions [m/s]."""
+
+    def record(self, on: bool) -> Answer:
+        """Begin a log in the default folder, or end the present one."""
 
     def trim(self, condition: TrimCondition) -> Answer:
         """Trim a condition and tell the result."""
@@ -83,25 +88,33 @@ class FlyPanel:
     Parameters
     ----------
     server : ViserServer
-    aircraft : Aircraft
     pilot : Pilot
     here : callable
         Condition of the flight right now, None before there is one.
     """
 
-    def __init__(
-        self, server: ViserServer, aircraft: Aircraft, pilot: Pilot, here: Callable[[], TrimCondition | None]
-    ) -> None:
+    def __init__(self, server: ViserServer, pilot: Pilot, here: Callable[[], TrimCondition | None]) -> None:
         self._server, self._pilot, self._here = server, pilot, here
         self._paused = False
+        self._recording = False
         self._holding = False
-        self._ranges = np.degrees([aircraft.control_ranges[name] for name in CONTROL_NAMES])
+        self._aircraft: Aircraft | None = None
+        self._ranges = np.tile((-1.0, 1.0), (len(CONTROL_NAMES), 1))  # deg, until there is an aircraft
         self._add_clock()
         self._add_controls()
         self._add_reset()
         self._add_analysis()
         self._add_wind()
         self._add_keys()
+
+    def use(self, aircraft: Aircraft) -> None:
+        """Fly an aircraft from now on."""
+        self._aircraft = aircraft
+        self._ranges = np.degrees([aircraft.control_ranges[name] for name in CONTROL_NAMES])
+        self._release()
+        for slider, (low, high) in zip(self._sliders, self._ranges.tolist(), strict=True):
+            slider.min, slider.max = low, high
+            slider.value = float(np.clip(slider.value, low, high))
 
     # ------------------------------------------------------------------------------------------------------- parts
 
@@ -111,6 +124,8 @@ class FlyPanel:
         self._clock.on_click(lambda event: self._on_clock(event.target.value))
         self._pace = gui.add_dropdown("Real time ×", PACES, initial_value="1")
         self._pace.on_update(_by_user(self._on_pace))
+        self._record = gui.add_button(RECORD, hint="begins a log of the flight as it is now, or ends the present one")
+        self._record.on_click(lambda _: self._say("Recording", self._pilot.record(not self._recording)))
 
     def _add_controls(self) -> None:
         gui = self._server.gui
@@ -224,13 +239,17 @@ class FlyPanel:
 
     # ------------------------------------------------------------------------------------------------------ update
 
-    def update(self, controls: Array, playing: bool) -> None:
-        """Follow the flight: the controls that are in force [rad], unless this page commands them."""
+    def update(self, swashplate: Array, playing: bool, recording: bool) -> None:
+        """Follow the flight: the swashplate angles that are in force [rad], unless this page commands the controls."""
+        if self._recording != recording:
+            self._recording = recording
+            self._record.label = END_RECORD if recording else RECORD
         if self._paused == playing:
             self._paused = not playing
             self._clock.options = (PAUSE if playing else PLAY, STEP, RESET)
-        if self._holding:
+        if self._holding or self._aircraft is None:
             return
+        controls = pilot_controls(self._aircraft, swashplate)
         for slider, value in zip(self._sliders, np.degrees(controls), strict=True):
             rounded = round(float(value), 3)
             if not abs(slider.value - rounded) <= 0.5 * SLIDER_STEP:  # true for a NaN as well
@@ -247,8 +266,6 @@ class LogPanel:
         Paths that can be chosen.
     choose : callable
         Takes a path, or None for the live flight; what to say if it cannot be shown.
-    live : bool
-        There is a live flight.
     """
 
     def __init__(
@@ -256,13 +273,12 @@ class LogPanel:
         server: ViserServer,
         list_logs: Callable[[], Sequence[Path]],
         choose: Callable[[Path | None], Answer],
-        live: bool,
     ) -> None:
         self._server, self._list, self._choose = server, list_logs, choose
-        self._first = [LIVE] if live else []
+        self._first = NOTHING
         self._paths: dict[str, Path] = {}
         gui = server.gui
-        self._pick = gui.add_dropdown("Source", [*self._first, *self._names()] or ["none"])
+        self._pick = gui.add_dropdown("Source", [self._first, *self._names()])
         self._pick.on_update(_by_user(self._on_pick))
         gui.add_button("Look for new logs").on_click(lambda _: self._refresh())
         self.playing = gui.add_checkbox("Play", True)
@@ -279,9 +295,17 @@ class LogPanel:
 
     def _refresh(self) -> None:
         chosen = self._pick.value
-        self._pick.options = tuple([*self._first, *self._names()] or ["none"])
+        self._pick.options = (self._first, *self._names())
         if chosen in self._pick.options:
             self._pick.value = chosen
+
+    def offer_live(self, chosen: bool) -> None:
+        """Offer a live flight, and say that it is shown if it is."""
+        if self._first != LIVE:
+            self._first = LIVE
+            self._refresh()
+        if chosen:
+            self._pick.value = LIVE
 
     def _on_pick(self) -> None:
         done, message = self._choose(self._paths.get(self._pick.value))

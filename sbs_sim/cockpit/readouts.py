@@ -35,6 +35,8 @@ class Status:
         Path; empty if nothing is recorded.
     log_state : str
         What is wrong with the recording; empty if nothing is.
+    warnings : tuple of str
+        Where the model does not hold.
     """
 
     playing: bool = False
@@ -43,6 +45,7 @@ class Status:
     fault: str = ""
     log: str = ""
     log_state: str = ""
+    warnings: tuple[str, ...] = ()
 
 
 def condition_here(snapshot: Snapshot) -> TrimCondition:
@@ -99,6 +102,26 @@ def readout(aircraft: Aircraft, snapshot: Snapshot, status: Status, source: str)
     )
 
 
+def source_line(log: str, flying: bool) -> str:
+    """What the page shows: a live flight, a log of a name, or nothing; and whether a simulator is there.
+
+    Parameters
+    ----------
+    log : str
+        Name of the log that is shown; empty for none.
+    flying : bool
+        A simulator is there.
+    """
+    word, colour, more = ("LIVE", "#009E73", "") if flying else ("NO SIMULATOR", "#D55E00", "")
+    if log:
+        word, colour, more = "LOG", "#0072B2", f"{log}, {'a live flight goes on' if flying else 'no simulator'}"
+    mark = f"color:white;background:{colour};padding:1px 6px;border-radius:3px"
+    return (
+        '<div style="font:12px sans-serif;padding:6px 10px 0 10px">'
+        f'<b style="{mark}">{word}</b> <span style="color:#5c6670">{escape(more)}</span></div>'
+    )
+
+
 def _fixed(value: float) -> str:
     """Number with two decimals, without a minus before zeros."""
     return f"{round(float(value), 2) + 0.0:.2f}"
@@ -137,5 +160,6 @@ def _state_line(status: Status, source: str) -> str:
     lines = [f"<b>{escape(source)}</b> {doing}{late}"]
     if status.log:
         lines.append(f'<span style="color:#5c6670">recording {escape(Path(status.log).name)}</span>')
-    lines += [f'<span style="color:#D55E00">{escape(text)}</span>' for text in (status.fault, status.log_state) if text]
+    told = (status.fault, status.log_state, *(f"outside the model's validity: {text}" for text in status.warnings))
+    lines += [f'<span style="color:#D55E00">{escape(text)}</span>' for text in told if text]
     return f'<div style="margin-top:4px;line-height:1.4">{"<br>".join(lines)}</div>'

@@ -9,11 +9,11 @@ from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimCondition
-from sbs_sim.cockpit.charts import ChartColumn, body_charts, pilot_controls, rotor_charts
+from sbs_sim.cockpit.charts import ChartColumn, body_charts, rotor_charts
 from sbs_sim.cockpit.panels import CAMERAS, Answer, FlyPanel, LogPanel, Pilot, ViewPanel
 from sbs_sim.cockpit.playback import Recording, recordings
 from sbs_sim.cockpit.poles import Pole, pole_page
-from sbs_sim.cockpit.readouts import Status, condition_here, readout
+from sbs_sim.cockpit.readouts import Status, condition_here, readout, source_line
 from sbs_sim.cockpit.scene import ARROW_OF_MOMENT, COLOURS, MOMENT, PATH, THRUST, Scene, Shown
 from sbs_sim.errors import SbsError
 from sbs_sim.simulation import Snapshot
@@ -23,6 +23,10 @@ READOUT_EVERY, CHARTS_EVERY = 3, 6  # frames
 PANEL_WIDTH = 308  # pixels
 
 
+NO_FLIGHT = (
+    '<div style="font:12px sans-serif;padding:10px">No simulator flies. <b>./run simulator</b> starts one, which'
+    " comes in here by itself. <b>Logs</b> can be looked at meanwhile.</div>"
+)
 NO_MODEL = '<div style="font:12px sans-serif;padding:10px">No linear model yet: <b>Linearize here</b> makes one.</div>'
 
 
@@ -36,11 +40,14 @@ class Live:
     lead : float
         Simulation time that has gone since the snapshot [s].
     status : Status
+    gone : bool
+        The simulator says nothing any more.
     """
 
     snapshot: Snapshot
     lead: float
     status: Status
+    gone: bool = False
 
 
 class View:
@@ -49,8 +56,6 @@ class View:
     Parameters
     ----------
     server : ViserServer
-    aircraft : Aircraft
-        Of the live flight.
     pilot : Pilot
     live : callable
         The live flight, None while there is none.
@@ -58,36 +63,39 @@ class View:
         Where the logs are.
     """
 
-    def __init__(
-        self, server: ViserServer, aircraft: Aircraft, pilot: Pilot, live: Callable[[], Live | None], folder: Path
-    ) -> None:
-        self._server, self._aircraft, self._live = server, aircraft, live
+    def __init__(self, server: ViserServer, pilot: Pilot, live: Callable[[], Live | None], folder: Path) -> None:
+        self._server, self._pilot, self._live = server, pilot, live
+        self._aircraft: Aircraft | None = None  # of the live flight
         self._recording: Recording | None = None
         self._place = 0.0
         self._lock = threading.RLock()  # callbacks of the page come in threads of their own
         self._frames = 0
         self._shown = Shown()
-        self._scene = Scene(server, aircraft, self._shown)
+        self._scene: Scene | None = None
+        self._columns: list[ChartColumn] = []
         server.initial_camera.position = CAMERAS["behind"]
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
-        self._add_main_panel(pilot, folder)
+        self._add_main_panel(folder)
         self._add_charts()
 
-    def _add_main_panel(self, pilot: Pilot, folder: Path) -> None:
+    def _add_main_panel(self, folder: Path) -> None:
         gui = self._server.gui
         gui.set_panel_label("sbs_sim")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
+        self._source = gui.add_html(source_line("", False))
         self._readout = gui.add_html("")
         tabs = gui.add_tab_group()
-        with tabs.add_tab("Fly"):
-            self._fly = FlyPanel(self._server, self._aircraft, pilot, self._here)
+        self._fly: FlyPanel | None = None
+        self._fly_tab = tabs.add_tab("Fly")
+        with self._fly_tab:
+            self._no_flight = gui.add_html(NO_FLIGHT)
         with tabs.add_tab("Logs"):
-            self._logs = LogPanel(self._server, lambda: recordings(folder), self.show, True)
+            self._logs = LogPanel(self._server, lambda: recordings(folder), self.show)
         with tabs.add_tab("View"):
             ViewPanel(self._server, self._shown)
-            gui.add_html(_legend(self._scene))
+            self._legend = gui.add_html("")
 
     def _add_charts(self) -> None:
         panel = self._server.gui.add_panel()
@@ -96,7 +104,6 @@ class View:
             self._modes = self._server.gui.add_html(NO_MODEL)
         panel.dock_left()
         panel.set_width(PANEL_WIDTH)
-        self._columns = self._make_columns(self._aircraft)
 
     def _make_columns(self, aircraft: Aircraft) -> list[ChartColumn]:
         columns = []
@@ -107,6 +114,19 @@ class View:
 
     # -------------------------------------------------------------------------------------------------- what to show
 
+    def fly(self, aircraft: Aircraft) -> None:
+        """Offer a live flight of an aircraft, and show it if no log is being shown."""
+        with self._lock:
+            self._aircraft = aircraft
+            if self._fly is None:
+                self._no_flight.remove()
+                with self._fly_tab:
+                    self._fly = FlyPanel(self._server, self._pilot, self._here)
+            self._fly.use(aircraft)
+            self._logs.offer_live(self._recording is None)
+            if self._recording is None:
+                self._use(aircraft)
+
     def show(self, path: Path | None) -> Answer:
         """Show a log from its beginning, or the live flight; a log that cannot be shown changes nothing."""
         try:
@@ -116,7 +136,8 @@ class View:
         with self._lock:
             self._recording = recording
             self._place = recording.beginning if recording else 0.0
-            self._use(recording.aircraft if recording else self._aircraft)
+            if (aircraft := recording.aircraft if recording else self._aircraft) is not None:
+                self._use(aircraft)
             if recording is None:
                 self._logs.enable(False)
                 return True, ""
@@ -134,16 +155,19 @@ class View:
 
     def _use(self, aircraft: Aircraft) -> None:
         """Draw an aircraft, from now on and without what was before."""
-        if aircraft.parameter_hash != self._scene.aircraft.parameter_hash:
-            self._scene.remove()
+        if self._scene is None or aircraft.parameter_hash != self._scene.aircraft.parameter_hash:
+            if self._scene is not None:
+                self._scene.remove()
             self._scene = Scene(self._server, aircraft, self._shown)
+            self._legend.content = _legend(self._scene)
             for column in self._columns:
                 column.remove()
             self._columns = self._make_columns(aircraft)
         self._forget()
 
     def _forget(self) -> None:
-        self._scene.clear_trail()
+        if self._scene is not None:
+            self._scene.clear_trail()
         for column in self._columns:
             column.history.clear()
 
@@ -160,23 +184,25 @@ class View:
         with self._lock:
             live = self._live()
             shown = live if self._recording is None else self._replayed(self._recording, elapsed)
-            if shown is None:
-                return
             self._frames += 1
+            if self._frames % READOUT_EVERY == 0:
+                log = "" if self._recording is None else self._recording.path.name
+                self._source.content = source_line(log, live is not None and not live.gone)
+            if shown is None or self._scene is None:
+                return
             with self._server.atomic():
-                self._draw(shown)
-            if live is not None and self._frames % READOUT_EVERY == 0:
-                controls = pilot_controls(self._aircraft, live.snapshot.swashplate)
-                self._fly.update(controls, live.status.playing)
+                self._draw(shown, self._scene)
+            if live is not None and self._fly is not None and self._frames % READOUT_EVERY == 0:
+                self._fly.update(live.snapshot.swashplate, live.status.playing, bool(live.status.log))
 
-    def _draw(self, shown: Live) -> None:
+    def _draw(self, shown: Live, scene: Scene) -> None:
         snapshot = shown.snapshot
-        self._scene.draw(snapshot, shown.lead)
+        scene.draw(snapshot, shown.lead)
         for column in self._columns:
             column.history.add(snapshot)
         if self._frames % READOUT_EVERY == 0:
-            source = self._aircraft.name if self._recording is None else self._recording.path.name
-            self._readout.content = readout(self._scene.aircraft, snapshot, shown.status, source)
+            source = scene.aircraft.name if self._recording is None else self._recording.path.name
+            self._readout.content = readout(scene.aircraft, snapshot, shown.status, source)
         if self._frames % CHARTS_EVERY == 0:
             for column in self._columns:
                 column.update()

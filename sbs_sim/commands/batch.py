@@ -12,9 +12,9 @@ from sbs_sim.commands.common import (
     fixed,
     flight,
     print_table,
-    progress_bar,
 )
 from sbs_sim.errors import BatchError
+from sbs_sim.progress import progress_bar
 
 if TYPE_CHECKING:
     from sbs_sim.batch import Batch
@@ -81,7 +81,7 @@ def _work(arguments: argparse.Namespace) -> None:
         seed=arguments.seed,
         spread=dict(arguments.spread),
     )
-    with progress_bar(len(cases), " flights") as progress:
+    with progress_bar(" flights", len(cases)) as progress:
         batch = simulate_batch(
             cases,
             arguments.duration,

@@ -11,8 +11,7 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from sbs_sim.errors import SbsError
@@ -177,18 +176,6 @@ def radians(name: str, degrees: float) -> float:
     limit = math.degrees(most)
     checks.number(f"{name}_deg", degrees, -limit, limit, unit.replace("rad", "deg"), TrimError)
     return max(-most, min(most, math.radians(degrees)))  # the limit itself may round to beyond it
-
-
-@contextmanager
-def progress_bar(total: int, unit: str) -> Iterator[Callable[..., None] | None]:
-    """What to call when one of `total` parts is done: a bar on stderr where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from tqdm import tqdm
-
-    with tqdm(total=total, unit=unit, file=sys.stderr, leave=False) as bar:
-        yield lambda *_: bar.update()
 
 
 # --- printing ---------------------------------------------------------------------------------------------------

@@ -1,13 +1,11 @@
 """`reproduce`: the paper's results computed anew, beside the printed ones."""
 
 import argparse
-import sys
 import textwrap
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from sbs_sim.commands.common import execute, print_table
+from sbs_sim.progress import progress_bar
 
 if TYPE_CHECKING:
     from sbs_sim.analysis.reproduce import Comparison, Report
@@ -50,7 +48,7 @@ def _work(arguments: argparse.Namespace) -> None:
         from sbs_sim.analysis.page import make_folder
 
         make_folder(arguments.out)
-    with _progress_bar("model") as progress:
+    with progress_bar("model") as progress:
         report = reproduce(craft, paper_craft, progress=progress)
     if arguments.json:
         write(arguments.json, to_json(report.to_dict()))
@@ -58,26 +56,9 @@ def _work(arguments: argparse.Namespace) -> None:
     if arguments.out:
         from sbs_sim.analysis.page import save_page
 
-        with _progress_bar("figure") as progress:
+        with progress_bar("figure") as progress:
             written = save_page(report, arguments.out, progress=progress)
         print(f"written: {written[-1]} and {len(written) - 1} figures")
-
-
-@contextmanager
-def _progress_bar(unit: str) -> Iterator[Callable[[int, int], None] | None]:
-    """A bar on stderr where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from tqdm import tqdm
-
-    with tqdm(unit=unit, file=sys.stderr, leave=False) as bar:
-
-        def progress(done: int, total: int) -> None:
-            bar.total = total
-            bar.update(done - bar.n)
-
-        yield progress
 
 
 def _print_report(report: "Report") -> None:

@@ -14,10 +14,10 @@ from sbs_sim.commands.common import (
     fixed,
     flight,
     print_table,
-    progress_bar,
     radians,
 )
 from sbs_sim.errors import SbsError, SweepError
+from sbs_sim.progress import progress_bar
 
 if TYPE_CHECKING:
     from sbs_sim.analysis.sweep import Sweep, SweepPoint
@@ -76,7 +76,7 @@ def _work(arguments: argparse.Namespace) -> None:
     check_target(arguments.csv)
     check_target(arguments.json)
     craft = aircraft(arguments)
-    with progress_bar(len(values), " points") as progress:
+    with progress_bar(" points", len(values)) as progress:
         found = sweep(
             craft,
             parameter,

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 # columns of the wind of one tick
 STEADY, GUST, GUST_START, GUST_DURATION, TURBULENCE_FROM, TURBULENCE_TO = 0, 3, 6, 7, 8, 11
 WIND_SIZE = 14
+BLOCK = 10_000  # ticks that turbulence goes on by at once
 LARGEST_WIND = 100.0  # m/s; the strongest wind measured at the ground is 113 m/s
 RANGES = {
     "gust_delay": (0.0, 1e6, "s"),
@@ -111,10 +112,16 @@ class WindField:
         Simulation time of the first tick [s].
     tick : float
         Length of a tick [s].
+
+    Attributes
+    ----------
+    ticks : int
+        How many ticks were asked for.
     """
 
     def __init__(self, wind: Wind, start: float, tick: float) -> None:
         self.wind = wind
+        self.ticks = 0
         self._array = np.zeros(WIND_SIZE)
         self._array[STEADY : STEADY + 3] = wind.velocity
         self._array[GUST : GUST + 3] = wind.gust
@@ -126,10 +133,21 @@ class WindField:
         """Array of the next tick, shape (WIND_SIZE,); the same memory at every call."""
         if self._turbulence is not None:
             self._array[:] = self.next_ticks(1)[0]
+        else:
+            self.ticks += 1
         return self._array
+
+    def tick_number(self, number: int) -> Array:
+        """Array of the tick of a number, 1 for the first; none of those before it may have been asked for."""
+        if self._turbulence is not None:
+            while self.ticks < number - 1:
+                self.next_ticks(min(number - 1 - self.ticks, BLOCK))
+        self.ticks = number - 1
+        return self.next_tick()
 
     def next_ticks(self, count: int) -> Array:
         """Arrays of the next ticks, shape (count, WIND_SIZE): what `next_tick` gives one by one, bit for bit."""
+        self.ticks += count
         rows = np.tile(self._array, (count, 1))
         if self._turbulence is not None:
             ends = self._turbulence.advance(count)

@@ -6,6 +6,7 @@ already. What is slow to import is imported when the command line is known to be
 
 import argparse
 import ctypes
+import os
 import signal
 import socket
 import subprocess
@@ -91,20 +92,21 @@ class Start:
         Raises
         ------
         SbsError
-            The address is taken, or a simulator flies already.
+            The address is taken, there is no such folder, or a simulator flies already.
         """
-        host, port, attach = self._options.host, self._options.port, self._options.attach
+        host, port, alone = self._options.host, self._options.port, self._options.attach or self._options.logs
         check_address(host, port)
+        folder = checked_folder(self._options.logs)
         lookout, since = Component("cockpit_lookout"), time.monotonic()
         from sbs_sim.nodes.cockpit_node import Cockpit  # meanwhile the lookout discovers others
 
         try:
-            if not attach:
+            if not alone:
                 _refuse_second_simulator(lookout, since + 2 * DISCOVERY)  # half of it goes by importing
                 self._simulator = Simulator(self._ros_arguments, self._end)
         finally:
             lookout.destroy_node()
-        self._cockpit = Cockpit(host, port, self._end, pause=not attach)
+        self._cockpit = Cockpit(host, port, self._end, not alone, folder)
         return [self._cockpit]
 
     def finish(self) -> int:
@@ -135,6 +137,20 @@ def check_address(host: str, port: int) -> None:
         raise SbsError(f"cannot serve on {host}:{port}: {error.strerror or error}; see --host and --port") from None
 
 
+def checked_folder(name: str) -> Path:
+    """Folder of the logs: one that was named, or the default, which need not be there yet.
+
+    Raises
+    ------
+    SbsError
+        There is no such folder.
+    """
+    folder = Path(name or os.environ.get("SBS_SIM_BAGS") or "bags")
+    if name and not folder.is_dir():
+        raise SbsError(f"--logs {name}: allowed is a folder with logs")
+    return folder
+
+
 def make_parser() -> argparse.ArgumentParser:
     """Command line of `cockpit`."""
     parser = argparse.ArgumentParser(
@@ -144,7 +160,8 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--host", default=HOST, help=f"address to serve on (default: {HOST}, this machine only)")
     parser.add_argument("--port", type=int, default=PORT, help=f"1 to 65535 (default: {PORT})")
-    parser.add_argument("--attach", action="store_true", help="join a simulator that flies already, start none")
+    parser.add_argument("--attach", action="store_true", help="start no simulator: join one that flies, now or later")
+    parser.add_argument("--logs", default="", metavar="FOLDER", help="start no simulator; show the logs of this folder")
     return parser
 
 

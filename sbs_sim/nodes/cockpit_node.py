@@ -4,17 +4,14 @@ Subscribes `state`, `rotors`, `inflow`, `events`, `status`, `linear_model`; publ
 `reset`, `set_wind`, `trim`, `linearize`, and sets the simulator's `real_time_factor`.
 """
 
-import ipaddress
 import math
 import os
 import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import numpy as np
 import rich
@@ -22,10 +19,10 @@ from numpy.typing import NDArray
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from viser import ViserServer
-from viser.infra import WebsockClientConnection
 
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, LinearModel, RotorStateArray, SimulationStatus
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.cockpit.gate import guarded
 from sbs_sim.cockpit.poles import Pole
 from sbs_sim.cockpit.readouts import Status
 from sbs_sim.cockpit.view import FRAME_PERIOD, Live, View
@@ -41,7 +38,8 @@ Array = NDArray[np.float64]
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 MESSAGES = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "status": SimulationStatus}
 LONGEST_LEAD = 0.1  # s of simulation time that rotors are turned on without a message
-SILENCE = 3.0  # s without a message of a flight that plays: it is gone
+SILENCE = 3.0  # s without a message: the flight is gone
+LOOK_PERIOD = 0.1  # s between looks for a simulator
 NICE = 5  # the flight comes before its picture
 
 
@@ -56,12 +54,15 @@ class Cockpit(Component):
     end : threading.Event
         Set when there is nothing to show any more.
     pause : bool
-        Pause the flight before the page is served: nobody holds its controls yet.
+        Wait for a flight and pause it before the page is served: nobody holds its controls yet. Else the page is served
+        at once, and flights come and go.
+    folder : Path
+        Where the logs are.
     """
 
-    def __init__(self, host: str, port: int, end: threading.Event, pause: bool) -> None:
+    def __init__(self, host: str, port: int, end: threading.Event, pause: bool, folder: Path) -> None:
         super().__init__("cockpit")
-        self._place, self._end, self._pause = (host, port), end, pause
+        self._place, self._end, self._pause, self._folder = (host, port), end, pause, folder
         self._newest: dict[str, bytes] = {}
         self._arrived = 0.0
         self._swashplate: Array | None = None
@@ -69,23 +70,25 @@ class Cockpit(Component):
         self._model: LinearModel | None = None
         self._pilot = RemotePilot(self)
         self._aircraft: Aircraft | None = None
-        self._period, self._last = 0.0, 0.0
+        self._found: Aircraft | None = None  # that another simulator has begun to fly
         self.failed = False
         for name, kind in MESSAGES.items():
             self.create_subscription(kind, name, lambda data, name=name: self._keep(name, data), NEWEST, raw=True)
         self.create_subscription(FlightEvent, "events", self._on_event, EVENT_QOS)
         self.create_subscription(LinearModel, "linear_model", self._on_model, LATCHED_QOS)
-        thread = threading.Thread(target=self._show, name="drawing", daemon=True)
-        self.workers.append(thread)
-        thread.start()
+        for thread in os.listdir("/proc/self/task"):  # the kernel knows priorities of threads alone; others inherit
+            os.setpriority(os.PRIO_PROCESS, int(thread), NICE)
+        for name, work in (("drawing", self._show), ("lookout", self._look_out)):
+            self.workers.append(threading.Thread(target=work, name=name, daemon=True))
+        for worker in self.workers:
+            worker.start()
 
     # ------------------------------------------------------------------------------------------------ what comes in
 
     def _keep(self, name: str, data: bytes) -> None:
         """Keep a message as it came: only those that are drawn are taken apart."""
         self._newest[name] = data
-        if name == "state":
-            self._arrived = time.monotonic()
+        self._arrived = time.monotonic()  # status comes while the flight is paused, too
 
     def _on_event(self, event: FlightEvent) -> None:
         angles, velocity = np.array(event.swashplate), event.wind.velocity
@@ -100,32 +103,35 @@ class Cockpit(Component):
 
     def _live(self) -> Live | None:
         """The flight of the newest messages; None before there is one, or while they cannot be drawn."""
+        aircraft, swashplate = self._aircraft, self._swashplate
         try:
             newest = {name: _message(data, MESSAGES[name]) for name, data in dict(self._newest).items()}
-            if len(newest) < len(MESSAGES) or self._swashplate is None or self._aircraft is None:
+            if len(newest) < len(MESSAGES) or swashplate is None or aircraft is None:
                 return None
             told = newest["status"]
+            # those of the next simulator are refused here, until its aircraft is known
             snapshot = snapshot_of(
-                self._aircraft, newest["state"], newest["rotors"], newest["inflow"], self._swashplate, self._wind
+                aircraft, newest["state"], newest["rotors"], newest["inflow"], swashplate, self._wind
             )
             _check_status(told)
         except SbsError as error:
             self.get_logger().warning(f"not drawn: {error}", throttle_duration_sec=COMPLAINT_PERIOD)
             return None
+        if len(swashplate) != len(aircraft.rotors):
+            return None
         playing, age = told.state == SimulationStatus.PLAYING, time.monotonic() - self._arrived
-        if playing and age > SILENCE:
+        if gone := age > SILENCE:
             told.fault = told.fault or f"no message of the simulator for {age:.0f} s"
-        return Live(snapshot, min(age * told.real_time_factor, LONGEST_LEAD) if playing else 0.0, _status(told))
+        lead = min(age * told.real_time_factor, LONGEST_LEAD) if playing else 0.0
+        return Live(snapshot, lead, _status(told), gone)
 
     # --------------------------------------------------------------------------------------------------- the page
 
     def _show(self) -> None:
         """Serve the page until the end."""
-        os.nice(NICE)  # of this thread and of those that it starts
         try:
-            aircraft = self._await_aircraft()
-            if aircraft is not None:
-                self._draw_all(aircraft)
+            if not self._pause or self._await_pause():
+                self._draw_all()
         except SbsError as error:
             print(" ".join(str(error).split()), file=sys.stderr)
             self.failed = True
@@ -135,20 +141,32 @@ class Cockpit(Component):
         finally:
             self._end.set()
 
-    def _await_aircraft(self) -> Aircraft | None:
-        """The aircraft that is flown, once the simulator says it."""
+    def _await_pause(self) -> bool:
+        """Wait until the flight is paused and its aircraft is known; false at the end."""
         while not self._end.wait(0.05):
             if self._pause:
                 self._pause = not self._pilot.pause(True)[0]
-            elif (name := self._pilot.aircraft()) is not None:
-                return Aircraft.load(name)
-        return None
+            elif self._found is not None:
+                return True
+        return False
 
-    def _draw_all(self, aircraft: Aircraft) -> None:
-        self._aircraft = aircraft
+    def _look_out(self) -> None:
+        """Learn what is flown whenever a simulator begins to be heard."""
+        known = False
+        while not self._end.wait(LOOK_PERIOD):
+            if time.monotonic() - self._arrived > SILENCE:
+                known = False
+            elif not known and (name := self._pilot.aircraft()) is not None:
+                known = True
+                try:
+                    self._found = Aircraft.load(name)
+                except SbsError as error:
+                    self.get_logger().error(f"the simulator's aircraft cannot be shown: {error}")
+
+    def _draw_all(self) -> None:
         host, port = self._place
         server = serve(host, port)
-        view = View(server, aircraft, self._pilot, self._live, bags())
+        view = View(server, self._pilot, self._live, self._folder)
         print(f"cockpit: http://{host}:{port}", flush=True)
         before = due = time.monotonic()
         while not self._end.is_set():
@@ -164,6 +182,10 @@ class Cockpit(Component):
         server.stop()
 
     def _draw(self, view: View, elapsed: float) -> None:
+        found, self._found = self._found, None
+        if found is not None:
+            self._aircraft = found
+            view.fly(found)
         model, self._model = self._model, None
         if model is not None:
             poles, title = _poles(model)
@@ -194,6 +216,7 @@ def _status(told: SimulationStatus) -> Status:
         told.fault,
         told.log,
         f"{lost}{told.log_fault}".strip(),
+        tuple(told.warnings),
     )
 
 
@@ -205,53 +228,12 @@ def _poles(model: LinearModel) -> tuple[list[Pole], str]:
 
 
 def serve(host: str, port: int) -> ViserServer:
-    """Server of the page, which says nothing of itself and is not to be shared through another machine."""
+    """Server of the page, which says nothing of itself, is not to be shared through another machine, and is guarded."""
     rich.get_console().quiet = True  # viser prints through it
-    server = ViserServer(host, port, verbose=False)
+    with guarded(host):
+        server = ViserServer(host, port, verbose=False)
     server.request_share_url = lambda verbose=True: None  # a page could ask for it
     if server.get_port() != port:  # viser goes on to the next port that is free
         server.stop()
         raise SbsError(f"cannot serve on {host}:{port}: it is in use")
-    _refuse_other_pages(server, host)
     return server
-
-
-def _refuse_other_pages(server: ViserServer, host: str) -> None:
-    """Let no other page that the browser shows fly: browsers allow any of them to connect to this machine.
-
-    They say in `Origin` where the page is from. Where the cockpit serves this machine only, it must be an address or
-    `localhost` as well, or a name that somebody lets point to this machine would do.
-    """
-    connections = server._websock_server
-
-    async def check(client: WebsockClientConnection) -> None:
-        connection = connections._live_connections[client.client_id]
-        headers = connection.request.headers if connection.request else {}
-        if not is_own_page(headers.get("Origin"), headers.get("Host", ""), host):
-            connection.transport.abort()  # before anything that it has sent is read
-
-    connections.on_client_connect(check)
-
-
-def is_own_page(origin: str | None, asked: str, host: str) -> bool:
-    """True if a page from `origin` (none for what is no browser) that was asked for at `asked` may fly."""
-    if origin is None:
-        return True
-    name = urlsplit(f"//{asked}").hostname or ""
-    return urlsplit(origin).netloc == asked and (
-        not _is_address(host, lambda address: address.is_loopback)
-        or name in ("localhost", host)
-        or _is_address(name, lambda _: True)
-    )
-
-
-def _is_address(text: str, holds: Callable[[ipaddress.IPv4Address | ipaddress.IPv6Address], bool]) -> bool:
-    try:
-        return holds(ipaddress.ip_address("127.0.0.1" if text == "localhost" else text))
-    except ValueError:
-        return False
-
-
-def bags() -> Path:
-    """Folder of the logs."""
-    return Path(os.environ.get("SBS_SIM_BAGS") or "bags")

@@ -122,6 +122,7 @@ def event_message(event: Event, step_size: float) -> FlightEvent:
         message.state = _doubles(event.state)
     if event.wind is not None:
         _fill_wind(message.wind, event.wind)
+    message.wind_step, message.wind_ticks = event.wind_step, event.wind_ticks
     return message
 
 

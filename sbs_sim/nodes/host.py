@@ -63,7 +63,7 @@ class Parameter:
 
 
 class Log(Protocol):
-    """Where messages are recorded; see `sbs_sim.nodes.recorder.Recorder`."""
+    """Where messages are recorded; see `sbs_sim.nodes.recording.Recording`."""
 
     def channel(self, topic: str, kind: Any, qos: QoSProfile) -> int:
         """Channel for the messages of a topic."""
@@ -94,6 +94,13 @@ class Topic:
         """Publish a message of a simulation time [s]; for `wait` and `essential` see `LogWriter.write`."""
         data = serialize_message(message)
         self._publisher.publish(data)
+        self._write(data, time, wait, essential)
+
+    def record(self, message: Any, time: float, wait: bool = False, essential: bool = False) -> None:
+        """Write a message into the log alone."""
+        self._write(serialize_message(message), time, wait, essential)
+
+    def _write(self, data: bytes, time: float, wait: bool, essential: bool) -> None:
         if self._log is not None:
             self._log.write(self._channel, time, data, wait, essential)
 

@@ -15,11 +15,12 @@ from sbs_sim.flight_loop import FlightLoop, Report
 from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.conversions import StateMessages, event_message, fill_working_states, to_time
 from sbs_sim.nodes.host import COMPLAINT_PERIOD, EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Topic, diagnostic
+from sbs_sim.simulation import Event
 
 PUBLISHING_TIME = 10.0  # s for what is still to be published at the end
 
 if TYPE_CHECKING:
-    from sbs_sim.nodes.recorder import Recorder
+    from sbs_sim.nodes.recording import Recording
 
 
 class Outputs:
@@ -32,13 +33,14 @@ class Outputs:
     loop : FlightLoop
     arrivals : Arrivals
         The commands of the simulator.
-    log : Recorder, optional
+    log : Recording, optional
         Where everything that is published is recorded.
     """
 
-    def __init__(self, node: Node, loop: FlightLoop, arrivals: Arrivals, log: "Recorder | None" = None) -> None:
+    def __init__(self, node: Node, loop: FlightLoop, arrivals: Arrivals, log: "Recording | None" = None) -> None:
         self._node, self._loop, self._arrivals, self._log = node, loop, arrivals, log
-        self._log_fault_said = False
+        self._log_fault_said = ""
+        self._begun = False  # the start of the flight is published
         self._messages = StateMessages(loop.aircraft)
         self._clock_message, self._status = Clock(), SimulationStatus()
         self._last_report: Report | None = None
@@ -70,8 +72,7 @@ class Outputs:
             self._clock_message.clock = stamp
             self._clock.publish(self._clock_message, now, wait)
             for event in report.events:
-                # no flight can be flown again without them
-                self._events.publish(event_message(event, self._loop.step_size), now, wait, essential=True)
+                self._tell_event(event, now, wait)
             if report.snapshot is not None:
                 self._messages.fill(report.snapshot)
                 self._state.publish(self._messages.state, now, wait)
@@ -79,6 +80,18 @@ class Outputs:
                 self._inflow.publish(self._messages.inflow, now, wait)
                 self._odom.publish(self._messages.odom, now, wait)
             self._publish_status(report, stamp, wait)
+
+    def _tell_event(self, event: Event, now: float, wait: bool) -> None:
+        """Publish and record an event: no flight can be flown again without it."""
+        message = event_message(event, self._loop.step_size)
+        if event.kind == FlightEvent.START and self._log is not None:
+            self._log.open()
+        if event.kind == FlightEvent.START and self._begun:
+            # that of a log in mid-flight: for everybody else nothing has begun
+            self._events.record(message, now, wait, essential=True)
+        else:
+            self._events.publish(message, now, wait, essential=True)
+        self._begun = True
 
     def _publish_status(self, report: Report, stamp: Any, wait: bool) -> None:
         status = self._status
@@ -94,7 +107,7 @@ class Outputs:
         if report.snapshot is not None:
             fill_working_states(status, self._loop.aircraft, report.snapshot)
         if self._log is not None:
-            status.log, status.log_dropped, status.log_fault = str(self._log.path), self._log.dropped, self._log.fault
+            status.log, status.log_dropped, status.log_fault = self._log.path, self._log.dropped, self._log.fault
         self._status_topic.publish(status, report.time, wait)
 
     def _say_changes(self, report: Report) -> None:
@@ -113,9 +126,9 @@ class Outputs:
 
     def say_log_fault(self) -> None:
         """One log line when the recording has failed."""
-        if self._log is not None and self._log.fault and not self._log_fault_said:
-            self._log_fault_said = True
-            self._node.get_logger().error(f"the log ends before the flight: {self._log.fault}")
+        if self._log is not None and (fault := self._log.fault) and fault != self._log_fault_said:
+            self._log_fault_said = fault
+            self._node.get_logger().error(f"the log ends before the flight: {fault}")
 
     def _publish_health(self) -> None:
         report = self._last_report

@@ -12,7 +12,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool
 
 from sbs_msgs.msg import Controls
-from sbs_msgs.srv import Linearize, Reset, SetWind, Step, Trim
+from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim
 from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.nodes.host import COMMAND_QOS
@@ -28,6 +28,7 @@ SERVICES = {
     "step": Step,
     "reset": Reset,
     "set_wind": SetWind,
+    "record": Record,
     "trim": Trim,
     "linearize": Linearize,
     "simulator/set_parameters": SetParameters,
@@ -112,6 +113,10 @@ class RemotePilot:
         intensity = request.turbulence_intensity
         intensity.x = intensity.y = intensity.z = float(turbulence)
         return self._ask("set_wind", request)
+
+    def record(self, on: bool) -> Answer:
+        """Begin a log in the default folder, or end the present one."""
+        return self._ask("record", Record.Request(record=on))
 
     def trim(self, condition: TrimCondition) -> Answer:
         """Trim a condition and tell the result."""

@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,11 +36,14 @@ from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
 from sbs_sim.nodes.executables import INTERRUPTED
 from sbs_sim.nodes.host import DISCOVERY, EVENT_QOS, STATE_QOS, Component, own_arguments, run
 from sbs_sim.nodes.recorder import Recorder, definition_file
+from sbs_sim.progress import progress_bar
 from sbs_sim.recording import Log, message_definition, read, recover
 from sbs_sim.recording.definitions import parse
 from sbs_sim.recording.flight import TOLERANCE, Flight, flight_of, verify, whole_until
 from sbs_sim.recording.playback import Playback
-from sbs_sim.simulation import Simulation, refly
+from sbs_sim.simulation import begun, refly
+
+Progress = Callable[[float, float], None]  # takes what is done and the total
 
 LARGEST_RATE = 1000.0
 LONGEST_DELAY = 3600.0  # s
@@ -75,6 +78,8 @@ class Replay(Component):
         Longest time to wait until somebody listens to every topic [s]; that in which others are found is waited anyway.
     ended : threading.Event
         Set at the end of the log.
+    progress : callable, optional
+        Called with the recorded time that has been played and that will be [s].
 
     Attributes
     ----------
@@ -92,6 +97,7 @@ class Replay(Component):
         topics: Sequence[str],
         delay: float,
         ended: threading.Event,
+        progress: Progress | None = None,
     ) -> None:
         super().__init__("replay")
         self._delay = delay
@@ -102,7 +108,7 @@ class Replay(Component):
         self._outputs = self._make_publishers(topics)
         self._wake = threading.Condition()
         self._paused = self._stopping = False
-        self._ended = ended
+        self._ended, self._progress = ended, progress
         self._next_look, self._lookout_end = 0.0, math.inf
         self.create_service(SetBool, "pause", self._on_pause)
         self._thread = threading.Thread(target=self._play, name="replay", daemon=True)
@@ -184,6 +190,7 @@ class Replay(Component):
         """Publish the log from start to end; false if that was broken off."""
         anchor: float | None = None
         begin = 0
+        length = min(self._end, self._playback.duration) - self._start
         for log_time, channel, data in self._playback.messages(self._start, self._end):
             if channel not in self._outputs:
                 continue
@@ -195,6 +202,8 @@ class Replay(Component):
             anchor += held
             self._look_out()
             self._outputs[channel].publish(data)
+            if self._progress is not None:
+                self._progress(min((log_time - begin) * 1e-9, length), length)
         if anchor is None:
             raise RecordingError(f"{self._playback.path}: there is nothing to play in this part or on these topics")
         return True
@@ -293,7 +302,12 @@ def _one_of(policy: Any, value: Any, first: tuple[str, int]) -> Any:
 
 
 def fly_with(
-    flight: Flight, changes: Sequence[str], last: int, output: Path, stop: threading.Event
+    flight: Flight,
+    changes: Sequence[str],
+    last: int,
+    output: Path,
+    stop: threading.Event,
+    progress: Progress | None = None,
 ) -> tuple[Path, int]:
     """Fly the events of a flight with a changed aircraft into a new log.
 
@@ -307,6 +321,8 @@ def fly_with(
     output : Path
     stop : threading.Event
         Ends the flight with a KeyboardInterrupt.
+    progress : callable, optional
+        Called with the number of steps that have been flown and of all of them.
 
     Returns
     -------
@@ -322,17 +338,15 @@ def fly_with(
     aircraft = flight.aircraft
     for change in changes:
         aircraft = changed(aircraft, change)
-    start = flight.events[0]
-    if start.state is None or start.swashplate is None:
-        raise RecordingError("the log lacks the start of its flight")
-    simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **flight.options)
     # rotors of another speed have another step: what acted acts at the same time
-    shorter = flight.step_size / simulation.step_size
+    step_size = begun(aircraft, flight.events, **flight.options).step_size
+    shorter = flight.step_size / step_size
     events = tuple(replace(event, step=round(event.step * shorter)) for event in flight.events)
+    simulation = begun(aircraft, events, **flight.options)
     log = Recorder(str(output), simulation, {"with": list(changes)})
     try:
         changed_flight = replace(flight, aircraft=aircraft, events=events)
-        steps = _write_flight(changed_flight, round(last * shorter), simulation.step_size, log, stop)
+        steps = _write_flight(changed_flight, round(last * shorter), step_size, log, stop, progress)
     except BaseException:  # an interruption too: half a flight looks like a whole one
         log.discard()
         raise
@@ -360,8 +374,15 @@ def changed(aircraft: Aircraft, change: str) -> Aircraft:
     return aircraft.with_value(path, value)
 
 
-def _write_flight(flight: Flight, last: int, step_size: float, log: Recorder, stop: threading.Event) -> int:
-    """Fly to a step and record; the number of the last step."""
+def _write_flight(
+    flight: Flight,
+    last: int,
+    step_size: float,
+    log: Recorder,
+    stop: threading.Event,
+    progress: Progress | None,
+) -> int:
+    """Fly to a step and record; the number of steps that were flown."""
     made = StateMessages(flight.aircraft)
     kinds = {
         "/clock": (Clock, STATE_QOS),
@@ -379,7 +400,7 @@ def _write_flight(flight: Flight, last: int, step_size: float, log: Recorder, st
     events = [event for event in flight.events if event.step <= last]
     for event in events:
         keep("/events", event_message(event, step_size), event.step * step_size)
-    flown = 0
+    first = flown = flight.events[0].step
     try:
         for snapshot in refly(flight.aircraft, events, last, **flight.options):
             if stop.is_set():
@@ -390,9 +411,11 @@ def _write_flight(flight: Flight, last: int, step_size: float, log: Recorder, st
                 keep(topic, message, snapshot.time)
             keep("/odom", made.odom, snapshot.time)
             flown = snapshot.step
+            if progress is not None:
+                progress(flown - first, last - first)
     except SbsError as error:
         print(f"the flight ended early: {error}", file=sys.stderr)
-    return flown
+    return flown - first
 
 
 # --- command line -----------------------------------------------------------------------------------------------
@@ -478,11 +501,11 @@ def _replay(options: argparse.Namespace) -> int:
     """Play until the end of the log or an interruption."""
     ended = threading.Event()
     players: list[Replay] = []
-    with Playback(options.file) as playback:
+    with Playback(options.file) as playback, progress_bar("s") as progress:
 
         def make() -> list[Component]:
-            part = (options.start, options.end)
-            players.append(Replay(playback, options.rate, *part, options.loop, options.topics, options.delay, ended))
+            how = (options.rate, options.start, options.end, options.loop, options.topics, options.delay)
+            players.append(Replay(playback, *how, ended, progress))
             return list(players)
 
         code = run(make, sys.argv[:1], ended)
@@ -496,7 +519,8 @@ def _recover(path: Path, output: str) -> int:
     target = Path(output) if output else path.with_name(f"{path.stem}{RECOVERED}")
     if target.is_dir():
         target /= f"{path.stem}{RECOVERED}"
-    found = recover(path, target)
+    with progress_bar("chunk") as progress:
+        found = recover(path, target, progress)
     until = "" if found.last_time is None else f" until {found.last_time:.3f} s"
     print(f"{target}: {found.messages} messages{until}")
     if found.complete:
@@ -515,7 +539,8 @@ def _verify(path: Path) -> int:
     """0 if every state came again as it should."""
     log = read(path)
     _tell_if_broken(log)
-    found = verify(flight_of(log))
+    with progress_bar("state") as progress:
+        found = verify(flight_of(log), progress)
     for name, (recorded, here) in found.other_versions.items():
         print(f"other {name}: {recorded or 'unknown'} recorded, {here} here")
     if found.identical:
@@ -539,17 +564,19 @@ def _fly_with(options: argparse.Namespace) -> int:
     """Fly the commands again, if they are all there."""
     log = read(options.file)
     flight = flight_of(log)
-    wanted = flight.steps[flight.steps * flight.step_size <= options.end + ROUNDING]
-    last = int(wanted[-1]) if len(wanted) else 0
+    first = flight.events[0].step  # 0 but for a log that was begun in mid-flight
+    wanted = flight.steps[(flight.steps - first) * flight.step_size <= options.end + ROUNDING]
+    last = int(wanted[-1]) if len(wanted) else first
     whole = whole_until(log)
     if last * flight.step_size > whole + ROUNDING:
-        end = math.floor((whole + ROUNDING) * 1e3) * 1e-3
+        end = math.floor((whole - first * flight.step_size + ROUNDING) * 1e3) * 1e-3
         raise RecordingError(f"{log.path} lacks commands after {end:.3f} s: --end {end:.3f} flies those before")
     _tell_if_broken(log)
     stop = threading.Event()  # an exception would be lost in the callbacks of the compiler
     signal.signal(signal.SIGINT, lambda *_: stop.set())
-    path, steps = fly_with(flight, options.changes, last, Path(options.output), stop)
-    print(f"{path}: {steps} of {last} steps")
+    with progress_bar("step") as progress:
+        path, steps = fly_with(flight, options.changes, last, Path(options.output), stop, progress)
+    print(f"{path}: {steps} of {last - first} steps")
     return 0
 
 

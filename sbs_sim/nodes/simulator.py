@@ -1,12 +1,13 @@
 """Node `simulator`: flies an aircraft in real time.
 
 Publishes `state`, `rotors`, `inflow`, `odom`, `/clock`, `status`, `diagnostics`; subscribes `swashplate`; serves
-`pause`, `step`, `reset`, `set_wind`. The executable brings up the control mixer and the analysis in the same process.
+`pause`, `step`, `reset`, `set_wind`. The executable brings up the control mixer, the analysis and the recorder in the
+same process.
 """
 
 import math
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from std_srvs.srv import SetBool
@@ -25,10 +26,8 @@ from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
 from sbs_sim.nodes.host import COMMAND_QOS, Component, Parameter, declare, run
 from sbs_sim.nodes.outputs import Outputs
+from sbs_sim.nodes.recording import Recording
 from sbs_sim.simulation import Simulation, trimmed_state
-
-if TYPE_CHECKING:
-    from sbs_sim.nodes.recorder import Recorder
 
 OFF = "off"
 COMPONENTS = ("simulator", "control_mixer", "analysis", "recorder")
@@ -86,14 +85,14 @@ class Simulator(Component):
         self.create_service(SetWind, "set_wind", self._on_set_wind)
         self.add_on_set_parameters_callback(self._on_parameters)
 
-    def _make_log(self, simulation: Simulation, values: dict[str, Any]) -> "Recorder | None":
-        """Recorder of the flight; None if it is not wanted."""
-        if "recorder" not in self.components or values["record"] == OFF:
+    def _make_log(self, simulation: Simulation, values: dict[str, Any]) -> Recording | None:
+        """What records the flight; None if it never will."""
+        if "recorder" not in self.components:
             return None
-        from sbs_sim.nodes.recorder import Recorder  # here, because who does not record need not have its packages
-
-        log = Recorder(values["record"], simulation, values)
-        self.get_logger().info(f"recording {log.path}")
+        log = Recording(simulation, self.loop, values)
+        if values["record"] != OFF:
+            log.begin(values["record"])
+            self.get_logger().info(f"recording {log.path}")
         return log
 
     def _start(self, values: dict[str, Any]) -> Simulation:
@@ -183,8 +182,10 @@ class Simulator(Component):
         """End the publishing, then the log."""
         self._outputs.join()
         if self.log is not None:
-            self.log.close()
-            self._outputs.say_log_fault()
+            try:
+                self.log.end()
+            except SbsError as error:
+                self.get_logger().error(str(error))
 
 
 def checked_components(names: list[str]) -> tuple[str, ...]:
@@ -208,6 +209,8 @@ def _nodes() -> list[Component]:
         nodes.append(ControlMixer(simulator.loop, simulator.log))
     if "analysis" in simulator.components:
         nodes.append(Analysis(simulator.loop, simulator.log))
+    if simulator.log is not None:
+        nodes.append(simulator.log)
     simulator.loop.start()  # last: what is loaded meanwhile would make it miss deadlines
     return nodes
 

@@ -4,7 +4,7 @@ import io
 import itertools
 import math
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -158,11 +158,12 @@ def flight_of(log: Log) -> Flight:
         steps, states = _states(log, aircraft, step_size)
         if not len(steps):
             raise RecordingError("the log holds no states")
-        if np.diff(steps, prepend=0).max() * step_size > LONGEST_GAP:
+        events = _events(log, aircraft)
+        if np.diff(steps, prepend=events[0].step).max() * step_size > LONGEST_GAP:
             raise RecordingError(f"the log has no states for more than {LONGEST_GAP:g} s of its flight")
         options = {name: _option(simulation[name], kind) for name, kind in OPTIONS.items()}
         options[GROUND] = float(simulation.get(GROUND, "-inf"))
-        return Flight(aircraft, options, _events(log, aircraft), steps, states, step_size, dict(recorded), folder)
+        return Flight(aircraft, options, events, steps, states, step_size, dict(recorded), folder)
     except KeyError as error:
         raise RecordingError(f"the log holds no flight of sbs_sim: {error.args[0]} is missing") from None
     except (ValueError, IndexError, TypeError, OverflowError) as error:  # of our names, but with other contents
@@ -224,6 +225,7 @@ def _events(log: Log, aircraft: Aircraft) -> tuple[Event, ...]:
                 swashplate.reshape(len(aircraft.rotors), -1) if swashplate.size else None,
                 state if state.size else None,
                 _wind(topic, i) if kind in ("start", "wind") else None,
+                *(int(topic[name][i]) if name in topic else 0 for name in ("wind_step", "wind_ticks")),
             )
         )
     return tuple(found)
@@ -274,8 +276,14 @@ def _common(*times: IntArray) -> tuple[IntArray, list[IntArray]]:
 # --- flown again ------------------------------------------------------------------------------------------------
 
 
-def verify(flight: Flight) -> Verification:
+def verify(flight: Flight, progress: Callable[[float, float], None] | None = None) -> Verification:
     """Fly a recorded flight again and compare every recorded state, bit for bit.
+
+    Parameters
+    ----------
+    flight : Flight
+    progress : callable, optional
+        Called with the number of states that have been compared and of all of them.
 
     Raises
     ------
@@ -289,6 +297,8 @@ def verify(flight: Flight) -> Verification:
     largest: Difference | None = None
     scale = np.maximum(np.abs(flight.states).max(axis=0), 1e-12)
     for i, flown in _beside(flight, refly(flight.aircraft, flight.events, int(flight.steps[-1]), **flight.options)):
+        if progress is not None:
+            progress(i + 1, len(flight.states))
         logged = flight.states[i]
         if logged.tobytes() == flown.state.tobytes():
             continue

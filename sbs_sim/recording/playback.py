@@ -61,6 +61,12 @@ class Playback:
             )
         return found
 
+    @property
+    def duration(self) -> float:
+        """Time from the first message to the last [s]."""
+        times = [(earliest, latest) for _, earliest, latest in self._chunks.values()]
+        return (max(last for _, last in times) - min(first for first, _ in times)) * 1e-9 if times else 0.0
+
     def messages(self, start: float = 0.0, end: float = math.inf) -> Iterator[tuple[int, int, bytes]]:
         """Log time [ns], channel and data of the messages of a part of the recording.
 

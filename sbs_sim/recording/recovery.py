@@ -1,6 +1,8 @@
 """Making a complete recording of what is left of a truncated or damaged one."""
 
+import itertools
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,7 +52,7 @@ class _Tally:
         self.count += len(messages)
 
 
-def recover(path: str | Path, output: str | Path) -> Recovery:
+def recover(path: str | Path, output: str | Path, progress: Callable[[float, float], None] | None = None) -> Recovery:
     """Write all that is whole in a recording into a new, complete one, and read that again to be sure of it.
 
     Parameters
@@ -59,6 +61,8 @@ def recover(path: str | Path, output: str | Path) -> Recovery:
         Any recording; it is not changed.
     output : path-like
         Must not exist.
+    progress : callable, optional
+        Called with the number of chunks that are done and of all of them: they are written, then read again.
 
     Raises
     ------
@@ -71,9 +75,15 @@ def recover(path: str | Path, output: str | Path) -> Recovery:
         require_something(source, found)
         target = NewFile(Path(output))
         try:
-            kept = _copy(source, found, target)
+            done = itertools.count(1)
+
+            def tell() -> None:
+                if progress is not None:
+                    progress(next(done), 2 * len(found.chunks))
+
+            kept = _copy(source, found, target, tell)
             target.close()
-            _verify(target.path, kept)
+            _verify(target.path, kept, tell)
         except BaseException:
             target.discard()
             raise
@@ -95,7 +105,7 @@ def messages_of(content: Content) -> list[Message]:
     ]
 
 
-def _copy(source: Source, found: Scan, target: NewFile) -> _Tally:
+def _copy(source: Source, found: Scan, target: NewFile, tell: Callable[[], None]) -> _Tally:
     """Write what is whole into the new file; tell what was written."""
     builder, kept = FileBuilder(), _Tally()
     builder.schemas, builder.channels = found.schemas, found.channels
@@ -107,6 +117,7 @@ def _copy(source: Source, found: Scan, target: NewFile) -> _Tally:
         target.write(builder.attachment(attachment))
 
     def take(content: Content) -> None:
+        tell()
         messages = [message for message in messages_of(content) if message[0] in found.channels]
         if messages:
             target.write(builder.chunk(messages))
@@ -124,10 +135,15 @@ def _copy(source: Source, found: Scan, target: NewFile) -> _Tally:
     return kept
 
 
-def _verify(path: Path, kept: _Tally) -> None:
+def _verify(path: Path, kept: _Tally, tell: Callable[[], None]) -> None:
     """Read the new file."""
     again = _Tally()
+
+    def take(content: Content) -> None:
+        tell()
+        again.add(messages_of(content))
+
     with Source(path) as source:
-        found = scan(source, lambda content: again.add(messages_of(content)))
+        found = scan(source, take)
     if not found.complete or found.reasons or (again.count, again.crc) != (kept.count, kept.crc):
         raise RecordingError(f"cannot write {path}: what was read back is not what was written")

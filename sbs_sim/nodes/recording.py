@@ -1,0 +1,134 @@
+"""Node `recorder`: one log after the other of a flight.
+
+Serves `record`, which begins and ends logs while the simulator flies. The nodes of the process write whatever they
+publish or accept through it, at any time; where no log is open, that costs nothing.
+"""
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+from rclpy.qos import QoSProfile
+
+from sbs_msgs.srv import Record
+from sbs_sim.errors import RecordingError, SbsError
+from sbs_sim.flight_loop import FlightLoop
+from sbs_sim.nodes.host import Component
+from sbs_sim.simulation import Simulation
+
+if TYPE_CHECKING:
+    from sbs_sim.nodes.recorder import Recorder
+
+
+class Recording(Component):
+    """See the module. A log begins with the start that the flight hands out for it, and not before.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Whose aircraft and options a log holds.
+    loop : FlightLoop
+    parameters : dict of str to object
+        Of the simulator, for the record.
+    """
+
+    def __init__(self, simulation: Simulation, loop: FlightLoop, parameters: dict[str, Any]) -> None:
+        super().__init__("recorder")
+        self._simulation, self._loop, self._parameters = simulation, loop, parameters
+        self._topics: list[tuple[str, Any, QoSProfile]] = []
+        self._lock = threading.Lock()  # topics may be added while a log begins
+        self._log: Recorder | None = None
+        self._open = False  # the start of the flight is in the log
+        self._channels: list[int] = []  # of the log, by our own numbers
+        self.create_service(Record, "record", self._on_record)
+
+    # ------------------------------------------------------------------------------------- what the nodes write into
+
+    def channel(self, topic: str, kind: Any, qos: QoSProfile) -> int:
+        """Channel for the messages of a topic, in this log and in all that follow."""
+        with self._lock:
+            self._topics.append((topic, kind, qos))
+            if self._log is not None:
+                self._channels.append(self._log.channel(topic, kind, qos))
+            return len(self._topics) - 1
+
+    def write(self, channel: int, time: float, data: bytes, wait: bool = False, essential: bool = False) -> None:
+        """Record a serialised message of a simulation time [s], see `LogWriter.write`; nothing without a log."""
+        log, channels = self._log, self._channels
+        if self._open and log is not None:
+            log.write(channels[channel], time, data, wait, essential)
+
+    def open(self) -> None:
+        """From now on what is written gets into the log that waits: called with the start of the flight in hand."""
+        self._open = self._log is not None
+
+    @property
+    def path(self) -> str:
+        """The present log; empty if there is none."""
+        return "" if (log := self._log) is None else str(log.path)
+
+    @property
+    def dropped(self) -> int:
+        """Messages that did not get into the present log."""
+        return 0 if (log := self._log) is None else log.dropped
+
+    @property
+    def fault(self) -> str:
+        """Why the present log cannot go on; empty if it can."""
+        return "" if (log := self._log) is None else log.fault
+
+    # --------------------------------------------------------------------------------------------- beginning and end
+
+    def begin(self, record: str) -> None:
+        """Make a log, which waits for the start of the flight; `record` is as for `Recorder`.
+
+        Raises
+        ------
+        RecordingError
+            There is one already, the file cannot be made, or a package is missing.
+        """
+        from sbs_sim.nodes.recorder import Recorder  # here, because who does not record need not have its packages
+
+        if self._log is not None:
+            raise RecordingError(f"recording {self.path} already: record = false ends it")
+        log = Recorder(record, self._simulation, self._parameters)
+        with self._lock:
+            self._channels = [log.channel(*topic) for topic in self._topics]
+            self._log = log
+
+    def end(self) -> str:
+        """End the log; its path, empty if there is none.
+
+        Raises
+        ------
+        RecordingError
+            It is not whole.
+        """
+        log, self._log, self._open = self._log, None, False
+        if log is None:
+            return ""
+        log.close()
+        if log.fault:
+            raise RecordingError(f"the log has ended before the flight: {log.fault}")
+        return str(log.path)
+
+    def _on_record(self, request: Record.Request, response: Record.Response) -> Record.Response:
+        response.path = "" if request.record else self.path
+        self.answer(response, lambda: self._act(request), "")
+        if response.success:
+            response.path = response.path or self.path
+            response.message = f"recording {response.path}" if request.record else f"recorded {response.path}"
+        return response
+
+    def _act(self, request: Record.Request) -> None:
+        if not request.record:
+            if not self.end():
+                raise RecordingError("record = false: nothing is recorded")
+            return
+        self.begin(request.path)
+        try:
+            self._loop.begin_log()
+        except SbsError:
+            log, self._log = self._log, None
+            if log is not None:
+                log.discard()
+            raise

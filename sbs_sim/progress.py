@@ -1,0 +1,33 @@
+"""Bars that show on a terminal how far long work is, and nothing elsewhere."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+@contextmanager
+def progress_bar(unit: str, total: float | None = None) -> Iterator[Callable[..., None] | None]:
+    """What to call with what is done and with the total, whatever stands before: a bar on stderr if that is a terminal.
+
+    None where it is not.
+
+    Parameters
+    ----------
+    unit : str
+        What is counted.
+    total : float, optional
+        Where it is known from the beginning.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=total, unit=unit, file=sys.stderr, leave=False) as bar:
+
+        def progress(*told: Any) -> None:
+            done, bar.total = told[-2:]
+            bar.update(done - bar.n)  # less than nothing where work begins again
+
+        yield progress

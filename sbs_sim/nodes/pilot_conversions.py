@@ -10,11 +10,17 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from numpy.typing import NDArray
 
-from sbs_msgs.msg import BodyState, Controls, LinearModel
+from sbs_msgs.msg import Controls, LinearModel
 from sbs_sim.errors import PilotError
-from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
-from sbs_sim.nodes.conversions import FRAME_NED, FRAME_ODOM, controls_array, enu_flu_quaternion, point_array
+from sbs_sim.nodes.conversions import (
+    FRAME_NED,
+    FRAME_ODOM,
+    controls_array,
+    controls_of,
+    enu_flu_quaternion,
+    point_array,
+)
 from sbs_sim.pilot.hover_hold import HoverModel
 
 Array = NDArray[np.float64]
@@ -24,17 +30,9 @@ LARGEST_TILT = math.radians(10.0)  # of a target, of which only the heading can 
 
 def controls_message(controls: Array, stamp: Time) -> Controls:
     """Message of pilot controls [rad], shape (4,)."""
-    message = Controls(**dict(zip(S.CONTROL_NAMES, controls.tolist(), strict=True)))
+    message = controls_of(controls)
     message.header.stamp = stamp
     return message
-
-
-def body_array(message: BodyState) -> Array:
-    """Position, attitude, velocity and rates, shape (13,): the first part of the simulation state."""
-    q = message.attitude
-    attitude = np.array([q.w, q.x, q.y, q.z])
-    vectors = [point_array(part) for part in (message.velocity, message.angular_velocity)]
-    return np.concatenate([point_array(message.position), attitude, *vectors])
 
 
 def hover_model(message: LinearModel) -> HoverModel:

@@ -1,24 +1,32 @@
 """Tells what the cockpit costs the flight: `./run python benchmarks/cockpit.py`.
 
-A simulator in real time alone, with a cockpit that nobody looks at, and with a page in headless Chromium. That page is
-drawn in software, and so takes the cores that a graphics card would spare.
+A simulator in real time alone, with a cockpit that nobody looks at, with a client that takes every picture and draws
+none, and with a page in headless Chromium. That page is drawn in software, and so takes the cores that a graphics card
+would spare.
 """
 
 import argparse
 import contextlib
+import math
 import os
 import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import psutil
 import rclpy
+import viser
+import zstandard
 from rclpy.node import Node
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
 
 from sbs_msgs.msg import SimulationStatus
 
@@ -35,6 +43,20 @@ COUNT_FRAMES = """seconds => new Promise(done => {
         ? (frames++, requestAnimationFrame(next)) : done(frames / seconds);
     requestAnimationFrame(next);
 })"""
+
+
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (-2.0, 1.2, 1.0),
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+    "fov": 0.8,
+    "near": 0.01,
+    "far": 1e3,
+    "image_height": 800,
+    "image_width": 1280,
+}
 
 
 class Watch(Node):
@@ -54,6 +76,51 @@ class Watch(Node):
         while self.status is None:
             rclpy.spin_once(self, timeout_sec=1.0)
         return self.status
+
+
+class Taker:
+    """A client in a thread that takes what the cockpit sends, and draws nothing.
+
+    Parameters
+    ----------
+    port : int
+    """
+
+    def __init__(self, port: int) -> None:
+        subprotocol = Subprotocol(f"viser-v{viser.__version__}")
+        self._client = connect(f"ws://127.0.0.1:{port}", subprotocols=[subprotocol], proxy=None, max_size=None)
+        self._client.send(msgspec.msgpack.encode(CAMERA))  # viser counts those who look from somewhere
+        self._pictures: list[float] = []
+        self._begin, self._bytes = time.monotonic(), 0
+        self._thread = threading.Thread(target=self._take, daemon=True)
+
+    def __enter__(self) -> "Taker":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._client.close()
+        self._thread.join()
+
+    def _take(self) -> None:
+        """Count the windows in which the aircraft turns: one of each picture; viser may send a picture in several."""
+        for data in self._client:
+            self._bytes += len(data)
+            size = int.from_bytes(data[8:16], "little")
+            told = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
+            messages = msgspec.msgpack.decode(told)["messages"]
+            if any(one.get("name") == "/ned/body" and "wxyz" in one for one in messages):
+                self._pictures.append(time.monotonic())
+
+    def rate(self) -> float:
+        """Pictures per second; not a number where there were none."""
+        if len(self._pictures) < 2:
+            return math.nan
+        return (len(self._pictures) - 1) / (self._pictures[-1] - self._pictures[0])
+
+    def traffic(self) -> float:
+        """What came [kB/s]."""
+        return 1e-3 * self._bytes / (time.monotonic() - self._begin)
 
 
 def main() -> None:
@@ -76,6 +143,9 @@ def main() -> None:
             with started("cockpit", "--attach", "--port", str(port)) as cockpit:
                 wait_for_page(port)
                 row("with a cockpit", watch, seconds, simulator, cockpit)
+                with Taker(port) as taker:
+                    row("with a client that does not draw", watch, seconds, simulator, cockpit)
+                    print(f"the client gets {taker.rate():.1f} pictures/s, {taker.traffic():.0f} kB/s", flush=True)
                 if reason := browser.missing():
                     print(reason)
                 else:

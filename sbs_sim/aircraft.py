@@ -325,6 +325,12 @@ class Aircraft:
         """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls [rad], shape (4,)."""
         return np.stack([rotor.mixing @ np.asarray(controls, dtype=float) for rotor in self.rotors])
 
+    def unmix(self, angles: Array) -> Array:
+        """Pilot controls [rad], shape (4,), whose mixture is nearest to swashplate angles [rad], (n_rotors, 3)."""
+        mixing = np.concatenate([rotor.mixing for rotor in self.rotors])
+        controls: Array = np.linalg.lstsq(mixing, np.ravel(angles), rcond=None)[0]
+        return controls
+
     def fuselage(self) -> tuple[float, Array, Array]:
         """Mass [kg], first moment [kg m] and inertia [kg m^2] about the c.g. of the aircraft without blades.
 

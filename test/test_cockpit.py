@@ -28,7 +28,7 @@ from websockets.typing import Subprotocol
 from sbs_msgs.msg import BodyState, FlightEvent, SimulationStatus
 from sbs_sim import Aircraft, trim
 from sbs_sim.cockpit import geometry
-from sbs_sim.cockpit.charts import PERIOD, History, body_charts, pilot_controls, rotor_charts
+from sbs_sim.cockpit.charts import PERIOD, History, body_charts, rotor_charts
 from sbs_sim.cockpit.gate import refusal
 from sbs_sim.cockpit.playback import Recording, recordings
 from sbs_sim.cockpit.poles import Pole, pole_page
@@ -128,7 +128,7 @@ def test_colours_of_values_end_with_those_of_the_ends():
 
 def test_the_pilot_controls_come_back_from_the_swashplates():
     controls = np.radians([8.0, 1.0, -2.0, 0.5])
-    np.testing.assert_allclose(pilot_controls(AIRCRAFT, AIRCRAFT.mix(controls)), controls, atol=1e-14)
+    np.testing.assert_allclose(AIRCRAFT.unmix(AIRCRAFT.mix(controls)), controls, atol=1e-14)
 
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0, 0.0), (4.0, -3.0, 0.5)])
@@ -263,9 +263,9 @@ def test_a_recording_gives_what_was_recorded():
 def test_a_recording_knows_the_controls_of_every_time():
     # tools/make_hover_step.py: each control is raised by 0.5 deg for 0.3 s, one every 0.8 s from 0.5 s on
     recording = Recording(HOVER_STEP)
-    rest = pilot_controls(AIRCRAFT, recording.at(0.3).swashplate)
+    rest = AIRCRAFT.unmix(recording.at(0.3).swashplate)
     for i in range(4):
-        step = pilot_controls(AIRCRAFT, recording.at(0.5 + 0.8 * i + 0.2).swashplate) - rest
+        step = AIRCRAFT.unmix(recording.at(0.5 + 0.8 * i + 0.2).swashplate) - rest
         np.testing.assert_allclose(np.degrees(step), 0.5 * np.eye(4)[i], atol=1e-6)
 
 

@@ -6,8 +6,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from sbs_sim.analysis.monte_carlo import SHARES, quantities
-from sbs_sim.analysis.sweep_plots import COLOURS
 from sbs_sim.batch import Batch, percentiles
+from sbs_sim.plot_style import COLOURS
 
 SHOWN = ("height [m]", "u [m/s]", "v [m/s]", "roll [deg]", "pitch [deg]", "power [W]")
 SINGLE = 12  # flights that are drawn one by one

@@ -14,11 +14,11 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
+from sbs_sim.plot_style import COLOURS
 from sbs_sim.simulation import Snapshot
 
 Array = NDArray[np.float64]
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito
 WINDOW = 20.0  # s of simulation time that the charts show
 PERIOD = 0.04  # s of simulation time between two instants that are kept
 AXIS = "#5c6670"
@@ -53,13 +53,6 @@ class Chart:
     least: float
 
 
-def pilot_controls(aircraft: Aircraft, swashplate: Array) -> Array:
-    """Pilot controls [rad], shape (4,), whose mixture comes nearest to swashplate angles [rad], shape (n_rotors, 3)."""
-    mixing = np.concatenate([rotor.mixing for rotor in aircraft.rotors])
-    found, *_ = np.linalg.lstsq(mixing, swashplate.ravel(), rcond=None)
-    return found
-
-
 def body_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
     """Charts of the body and the controls."""
 
@@ -71,7 +64,7 @@ def body_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
         return lambda snapshot: list(factor * snapshot.state[first : first + 3])
 
     def controls(snapshot: Snapshot) -> list[float]:
-        return list(DEGREES * pilot_controls(aircraft, snapshot.swashplate))
+        return list(DEGREES * aircraft.unmix(snapshot.swashplate))
 
     def height(snapshot: Snapshot) -> list[float]:
         return [-float(snapshot.state[S.POSITION + 2])]

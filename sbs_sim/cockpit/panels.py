@@ -11,7 +11,6 @@ from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimCondition
-from sbs_sim.cockpit.charts import pilot_controls
 from sbs_sim.cockpit.scene import Shown
 from sbs_sim.model.state import CONTROL_NAMES
 
@@ -249,7 +248,7 @@ class FlyPanel:
             self._clock.options = (PAUSE if playing else PLAY, STEP, RESET)
         if self._holding or self._aircraft is None:
             return
-        controls = pilot_controls(self._aircraft, swashplate)
+        controls = self._aircraft.unmix(swashplate)
         for slider, value in zip(self._sliders, np.degrees(controls), strict=True):
             rounded = round(float(value), 3)
             if not abs(slider.value - rounded) <= 0.5 * SLIDER_STEP:  # true for a NaN as well

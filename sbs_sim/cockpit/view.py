@@ -190,6 +190,10 @@ class View:
                 self._source.content = source_line(log, live is not None and not live.gone)
             if shown is None or self._scene is None:
                 return
+            if not self._server.get_clients():  # nobody looks: only the histories go on
+                for column in self._columns:
+                    column.history.add(shown.snapshot)
+                return
             with self._server.atomic():
                 self._draw(shown, self._scene)
             if live is not None and self._fly is not None and self._frames % READOUT_EVERY == 0:

@@ -4,6 +4,7 @@ Subscribes `state`, `rotors`, `inflow`, `events`, `status`, `linear_model`; publ
 `reset`, `set_wind`, `trim`, `linearize`, and sets the simulator's `real_time_factor`.
 """
 
+import logging
 import math
 import os
 import sys
@@ -39,6 +40,7 @@ NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 MESSAGES = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "status": SimulationStatus}
 LONGEST_LEAD = 0.1  # s of simulation time that rotors are turned on without a message
 SILENCE = 3.0  # s without a message: the flight is gone
+LONGEST_REST = 0.2  # s between two pictures
 LOOK_PERIOD = 0.1  # s between looks for a simulator
 NICE = 5  # the flight comes before its picture
 
@@ -176,8 +178,9 @@ class Cockpit(Component):
             except Exception:  # the end of the page would be that of the flight
                 text = f"internal error: {traceback.format_exc()}"
                 self.get_logger().error(text, throttle_duration_sec=COMPLAINT_PERIOD)
-            before = now
-            due = max(due + FRAME_PERIOD, time.monotonic())
+            before, drawn = now, time.monotonic()
+            # where drawing is slow, on a busy machine, it takes half of the time at most
+            due = max(due + FRAME_PERIOD, drawn + min(drawn - now, LONGEST_REST))
             self._end.wait(due - time.monotonic())
         server.stop()
 
@@ -230,6 +233,8 @@ def _poles(model: LinearModel) -> tuple[list[Pole], str]:
 def serve(host: str, port: int) -> ViserServer:
     """Server of the page, which says nothing of itself, is not to be shared through another machine, and is guarded."""
     rich.get_console().quiet = True  # viser prints through it
+    # what is no request at all, such as a look whether the port is open, is no error of ours with pages of traceback
+    logging.getLogger("websockets.server").addFilter(lambda record: record.getMessage() != "opening handshake failed")
     with guarded(host):
         server = ViserServer(host, port, verbose=False)
     server.request_share_url = lambda verbose=True: None  # a page could ask for it

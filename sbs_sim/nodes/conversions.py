@@ -70,6 +70,11 @@ def to_seconds(time: Time) -> float:
     return time.sec + 1e-9 * time.nanosec
 
 
+def controls_of(controls: Array) -> Controls:
+    """Message, without a stamp, of pilot controls [rad], shape (4,)."""
+    return Controls(**dict(zip(S.CONTROL_NAMES, controls.tolist(), strict=True)))
+
+
 def controls_array(message: Controls) -> Array:
     """Pilot controls [rad], shape (4,)."""
     return np.array([getattr(message, name) for name in S.CONTROL_NAMES])
@@ -255,6 +260,12 @@ def enu_flu_quaternion(ned_frd: Sequence[float]) -> tuple[float, float, float, f
     return HALF * (w + z), HALF * (x + y), HALF * (x - y), HALF * (w - z)
 
 
+def body_array(message: BodyState) -> Array:
+    """Position, attitude, velocity and rates, shape (13,): the first part of the simulation state."""
+    q, parts = message.attitude, (message.velocity, message.angular_velocity)
+    return np.array([*_triple(message.position), q.w, q.x, q.y, q.z, *_triple(parts[0]), *_triple(parts[1])])
+
+
 def snapshot_of(
     aircraft: Aircraft, body: BodyState, rotors: RotorStateArray, inflow: InflowArray, swashplate: Array, wind: Array
 ) -> Snapshot:
@@ -282,11 +293,7 @@ def snapshot_of(
     if blades != layout.blades or len(inflow.rotors) != count or not sizes <= set(blades):
         raise SimulationError(f"the flight has rotors with {blades} blades, {aircraft.name} has {layout.blades}")
     state = np.empty(layout.size)
-    attitude = body.attitude
-    state[S.POSITION : S.ATTITUDE] = _triple(body.position)
-    state[S.ATTITUDE : S.VELOCITY] = attitude.w, attitude.x, attitude.y, attitude.z
-    state[S.VELOCITY : S.RATES] = _triple(body.velocity)
-    state[S.RATES : S.BODY_SIZE] = _triple(body.angular_velocity)
+    state[: S.BODY_SIZE] = body_array(body)
     loads = np.zeros((count, P.LOAD_SIZE))
     for j, rotor in enumerate(rotors.rotors):
         state[layout.flap(j)], state[layout.flap_rate(j)] = rotor.flap, rotor.flap_rate
@@ -327,7 +334,7 @@ def trim_message(aircraft: Aircraft, point: trim.TrimPoint) -> TrimPoint:
     rotors.fill(_mean_snapshot(aircraft, point))
     return TrimPoint(
         condition=_condition_message(point),
-        controls=Controls(**dict(zip(S.CONTROL_NAMES, point.controls.tolist(), strict=True))),
+        controls=controls_of(point.controls),
         roll=point.roll,
         pitch=point.pitch,
         swashplate=swashplate_messages(point.swashplate),

@@ -13,9 +13,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from sbs_msgs.msg import BodyState, Controls, FlightEvent, SimulationStatus
 from sbs_sim.errors import SbsError
-from sbs_sim.nodes.conversions import to_seconds
+from sbs_sim.nodes.conversions import body_array, to_seconds
 from sbs_sim.nodes.host import COMMAND_QOS, EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Component, Refusals, diagnostic
-from sbs_sim.nodes.pilot_conversions import body_array, check_event, controls_message
+from sbs_sim.nodes.pilot_conversions import check_event, controls_message
 
 Array = NDArray[np.float64]
 

@@ -10,14 +10,14 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from numpy.typing import NDArray
 
-from sbs_msgs.msg import BodyState, Controls, FlightEvent, LinearModel
+from sbs_msgs.msg import Controls, FlightEvent, LinearModel
 from sbs_sim.errors import PilotError
-from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.nodes.conversions import (
     FRAME_NED,
     FRAME_ODOM,
     controls_array,
+    controls_of,
     enu_flu_quaternion,
     point_array,
     to_seconds,
@@ -31,17 +31,9 @@ LARGEST_TILT = math.radians(10.0)  # of a target, of which only the heading can 
 
 def controls_message(controls: Array, stamp: Time) -> Controls:
     """Message of pilot controls [rad], shape (4,)."""
-    message = Controls(**dict(zip(S.CONTROL_NAMES, controls.tolist(), strict=True)))
+    message = controls_of(controls)
     message.header.stamp = stamp
     return message
-
-
-def body_array(message: BodyState) -> Array:
-    """Position, attitude, velocity and rates, shape (13,): the first part of the simulation state."""
-    q = message.attitude
-    attitude = np.array([q.w, q.x, q.y, q.z])
-    vectors = [point_array(part) for part in (message.velocity, message.angular_velocity)]
-    return np.concatenate([point_array(message.position), attitude, *vectors])
 
 
 def check_event(message: FlightEvent) -> None:

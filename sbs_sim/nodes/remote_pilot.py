@@ -1,5 +1,6 @@
 """A pilot who asks a simulator over ROS: the calls behind the buttons of the cockpit."""
 
+import dataclasses
 import math
 import threading
 from typing import Any
@@ -15,6 +16,7 @@ from sbs_msgs.msg import Controls
 from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim
 from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.model.state import CONTROL_NAMES
+from sbs_sim.nodes.conversions import controls_of
 from sbs_sim.nodes.host import COMMAND_QOS
 
 Array = NDArray[np.float64]
@@ -80,8 +82,7 @@ class RemotePilot:
 
     def command(self, controls: Array | None) -> None:
         """Hold pilot controls [rad], shape (4,), from now on; None lets go of them."""
-        held = None if controls is None else dict(zip(CONTROL_NAMES, controls.tolist(), strict=True))
-        self._held = None if held is None else Controls(**held)
+        self._held = None if controls is None else controls_of(controls)
         self._hold()
 
     def pause(self, paused: bool) -> Answer:
@@ -146,8 +147,7 @@ class RemotePilot:
 
 def _condition(condition: TrimCondition) -> dict[str, float]:
     """Fields of a request."""
-    names = ("airspeed", "climb_rate", "sideslip", "turn_rate")
-    return {name: float(getattr(condition, name)) for name in names}
+    return {name: float(value) for name, value in dataclasses.asdict(condition).items()}
 
 
 def _words(condition: TrimCondition) -> str:

@@ -38,7 +38,6 @@ class StickNode(PilotNode):
         self.settings: dict[str, Any] = declare(self, parameters)
         self._aircraft = Aircraft.load(self.settings["aircraft"])
         self._found = augmentation(linearize(self._aircraft))
-        self._mixing = np.concatenate([rotor.mixing for rotor in self._aircraft.rotors])
         self._stand: Array | None = None  # pilot controls of the latest event
         self._first_event = 0.0
         self._first: tuple[Array, float, float] | None = None  # trim at the take-over
@@ -73,12 +72,12 @@ class StickNode(PilotNode):
     def on_event(self, event: FlightEvent, is_new: bool) -> None:
         """Learn where the controls stand; after a reset they are another flight's."""
         angles = np.array(event.swashplate)
-        if len(angles) != len(self._mixing):
+        if len(angles) != len(S.SWASHPLATE_NAMES) * len(self._aircraft.rotors):
             return
         if self._stand is None:
             self._first_event = time.monotonic()
         if self._first is None or event.kind in (FlightEvent.START, FlightEvent.RESET):
-            self._stand = np.linalg.lstsq(self._mixing, angles, rcond=None)[0]
+            self._stand = self._aircraft.unmix(angles)
         if self._first is not None and is_new and event.kind == FlightEvent.RESET and self._stand is not None:
             self.released()
             self._take_over(self._stand, np.array(event.state))

@@ -172,6 +172,9 @@ def test_multiblade_transform_is_one_to_one(blades, azimuth):
     """N_b coordinates for N_b blades; the columns are orthogonal, so that the condition is at most sqrt(2)."""
     matrix = blade_matrix(blades, azimuth)
     np.testing.assert_allclose(matrix, multiblade_matrix(blades, azimuth), atol=1e-12)
+    for order in (1, 2):  # derivatives by the azimuth: of the 9th harmonic up to 81 times as large
+        expected = multiblade_matrix(blades, azimuth, order)
+        np.testing.assert_allclose(blade_matrix(blades, azimuth, order), expected, atol=1e-10)
     assert np.linalg.cond(matrix) < 1.42
 
 

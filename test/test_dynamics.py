@@ -74,6 +74,9 @@ AIRCRAFT = {
     "tail_rotor": {"rotors": [{}, {"speed_rpm": 2300.0}, TAIL_ROTOR]},
     "tandem": {"rotors": [{"hub": [0.9, 0.0, -0.1]}, {"hub": [-0.9, 0.0, -0.3]}]},
     "single_upside_down": {"rotors": [{"hub": [0.1, 0.2, 0.3], "shaft_direction": [0.0, 0.0, 1.0]}]},
+    # every section at a Reynolds number beyond the table's, above and below
+    "high_reynolds": {"environment": {"kinematic_viscosity": 1e-8}},
+    "low_reynolds": {"environment": {"kinematic_viscosity": 1e-1}},
     "one_element": {"options": {"elements": 1}},
     "thirteen_elements": {"options": {"elements": 13}},
     "sixty_four_elements": {"options": {"elements": 64}},

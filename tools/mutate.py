@@ -35,15 +35,15 @@ GRACE = 20.0  # s that are added to it, for a machine that becomes busy
 
 REFERENCE = tuple(
     f"test_dynamics.py::test_derivative_and_loads_equal_the_plain_reference[{name}]"
-    for name in ("tilted_shafts", "four_and_five_blades", "paper_and_odd_blades")
+    for name in ("tilted_shafts", "four_and_five_blades", "paper_and_odd_blades", "high_reynolds")
 )
 MODULES: dict[str, tuple[str, ...]] = {
     "model/section": REFERENCE,
     "model/blade": REFERENCE,
     "model/dynamics": (
         *REFERENCE,
-        "test_two_loop.py::test_balance_equals_the_plain_reference[tilted_shafts-True]",
-        "test_two_loop.py::test_balance_equals_the_plain_reference[four_and_five_blades-False]",
+        "test_two_loop.py::test_balance_equals_the_plain_reference[tilted-True]",
+        "test_two_loop.py::test_balance_equals_the_plain_reference[four and five blades-False]",
     ),
     "model/inflow": (*REFERENCE, "test_inflow.py"),
     "model/multiblade": (*REFERENCE, "test_dynamics.py::test_multiblade_transform_is_one_to_one"),

@@ -34,10 +34,13 @@ def sections(rotor, elements, azimuth, velocity, collective, induced):
     return r * ds, collective + twist - np.arctan2(u_p, u_t), u_t, np.hypot(u_t, u_p), chord
 
 
-@pytest.mark.parametrize("velocity", [(50.0, 10.0, 3.0), (-30.0, 40.0, -4.0), (10.0, -60.0, 8.0), (-70.0, -20.0, 0.0)])
-def test_shares_of_the_disc_are_those_of_its_sections(velocity):
+@pytest.mark.parametrize(
+    ("velocity", "elements"),
+    [((50.0, 10.0, 3.0), 13), ((-30.0, 40.0, -4.0), 20), ((10.0, -60.0, 8.0), 33), ((-70.0, -20.0, 0.0), 131)],
+)
+def test_shares_of_the_disc_are_those_of_its_sections(velocity, elements):
     """Areas of annuli r dr; stalled outside of the angles at the section's Reynolds number; reversed by u_T <= 0."""
-    aircraft = build(every_rotor=BLADES, rotors=[{}, {"blades": 5}], options={"elements": 13})
+    aircraft = build(every_rotor=BLADES, rotors=[{}, {"blades": 5}], options={"elements": elements})
     model, collective, lambda0 = Model(aircraft), 0.1, 0.02
     azimuths = np.array([0.4, 2.9])
     x = model.state(velocity, lambda0=lambda0)
@@ -49,7 +52,7 @@ def test_shares_of_the_disc_are_those_of_its_sections(velocity):
         for k in range(rotor.blades):
             azimuth = azimuths[j] + 2 * np.pi * k / rotor.blades
             induced = lambda0 * rotor.speed * rotor.radius
-            part, alpha, u_t, speed, chord = sections(rotor, 13, azimuth, velocity, collective, induced)
+            part, alpha, u_t, speed, chord = sections(rotor, elements, azimuth, velocity, collective, induced)
             reynolds = speed * chord / aircraft.environment.kinematic_viscosity
             low, high = np.interp(reynolds, STALL[0], STALL[2]), np.interp(reynolds, STALL[0], STALL[1])
             area += part.sum()

@@ -4,7 +4,7 @@
 
 TEST are files of the folder test; without any they are all but those that start ROS nodes, which `--nodes` adds. The
 executables that tests start are measured too, those that are killed excepted. Compiled kernels do not show: what numba
-compiled, Python does not execute. So the quick tests of tools/mutate.py run a second time with the kernels as plain
+compiled, Python does not execute. So the quick tests of tools/mutate.py run first with the kernels as plain
 Python (NUMBA_DISABLE_JIT), and both count together; a kernel that only a flight executes is then still named, although
 it is tested. `--lines` names the lines and the branches, as LINE->LINE, that were not executed.
 
@@ -58,7 +58,9 @@ def main() -> int:
     if not arguments.only_report:
         _coverage("erase")
         tests = [f"test/{Path(test).name}" for test in arguments.tests] or _files(arguments.nodes)
-        code = _tests(tests, {}) | _tests(_plain_tests(), {"NUMBA_DISABLE_JIT": "1"})
+        code = _tests(_plain_tests(), {"NUMBA_DISABLE_JIT": "1"})
+        for test in tests:  # one by one: who interrupts it, and asks for --only-report, keeps what was measured
+            code |= _tests([test], {})
     _coverage("combine", "--keep", "--quiet")
     _coverage("json", "--quiet", "-o", str(FOLDER / "report.json"))
     _print(json.loads((FOLDER / "report.json").read_text())["files"], arguments.lines)

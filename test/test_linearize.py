@@ -401,7 +401,7 @@ def test_what_is_not_there_is_named(hover_model):
 
 
 def test_settled_states_are_those_of_the_zero_rates():
-    """x' = -2 x + 3 y + u, y' = 4 x - 5 y + 7 u: y settles at (4 x + 7 u) / 5, and x' = 0.4 x + 5.2 u is left."""
+    """Of x' = -2 x + 3 y + u, y' = 4 x - 5 y + 7 u with y = (4 x + 7 u) / 5 there is x' = 0.4 x + 5.2 u left."""
     a, b, by_state, by_control = settle(np.array([[-2.0, 3.0], [4.0, -5.0]]), np.array([[1.0], [7.0]]), [0])
     assert [float(part.item()) for part in (a, b, by_state, by_control)] == pytest.approx([0.4, 5.2, 0.8, 1.4])
 

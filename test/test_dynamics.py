@@ -74,6 +74,9 @@ AIRCRAFT = {
     "tail_rotor": {"rotors": [{}, {"speed_rpm": 2300.0}, TAIL_ROTOR]},
     "tandem": {"rotors": [{"hub": [0.9, 0.0, -0.1]}, {"hub": [-0.9, 0.0, -0.3]}]},
     "single_upside_down": {"rotors": [{"hub": [0.1, 0.2, 0.3], "shaft_direction": [0.0, 0.0, 1.0]}]},
+    # every section at a Reynolds number beyond the table's, above and below
+    "high_reynolds": {"environment": {"kinematic_viscosity": 1e-8}},
+    "low_reynolds": {"environment": {"kinematic_viscosity": 1e-1}},
     "one_element": {"options": {"elements": 1}},
     "thirteen_elements": {"options": {"elements": 13}},
     "sixty_four_elements": {"options": {"elements": 64}},
@@ -172,6 +175,9 @@ def test_multiblade_transform_is_one_to_one(blades, azimuth):
     """N_b coordinates for N_b blades; the columns are orthogonal, so that the condition is at most sqrt(2)."""
     matrix = blade_matrix(blades, azimuth)
     np.testing.assert_allclose(matrix, multiblade_matrix(blades, azimuth), atol=1e-12)
+    for order in (1, 2):  # derivatives by the azimuth: of the 9th harmonic up to 81 times as large
+        expected = multiblade_matrix(blades, azimuth, order)
+        np.testing.assert_allclose(blade_matrix(blades, azimuth, order), expected, atol=1e-10)
     assert np.linalg.cond(matrix) < 1.42
 
 

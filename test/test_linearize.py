@@ -8,7 +8,7 @@ import scipy.linalg
 from helpers import Model, aircraft_data, build, mirrored_data
 
 from sbs_sim import Aircraft, linearize, trim
-from sbs_sim.analysis.linearize import kinematics
+from sbs_sim.analysis.linearize import kinematics, settle
 from sbs_sim.errors import LinearizationError, TrimError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
@@ -398,3 +398,14 @@ def test_what_is_not_there_is_named(hover_model):
         hover_model.mode("flutter")
     with pytest.raises(LinearizationError, match="kept = psi"):
         hover_model.quasi_static(["u", "psi"])
+
+
+def test_settled_states_are_those_of_the_zero_rates():
+    """Of x' = -2 x + 3 y + u, y' = 4 x - 5 y + 7 u with y = (4 x + 7 u) / 5 there is x' = 0.4 x + 5.2 u left."""
+    a, b, by_state, by_control = settle(np.array([[-2.0, 3.0], [4.0, -5.0]]), np.array([[1.0], [7.0]]), [0])
+    assert [float(part.item()) for part in (a, b, by_state, by_control)] == pytest.approx([0.4, 5.2, 0.8, 1.4])
+
+
+def test_states_that_integrate_do_not_settle():
+    with pytest.raises(LinearizationError, match="do not settle: their matrix is singular"):
+        settle(np.array([[-1.0, 1.0], [1.0, 0.0]]), np.ones((2, 1)), [0])

@@ -69,8 +69,8 @@ def write(path: str | Path, content: bytes | str) -> None:
         else:
             path.write_bytes(data)
     except (OSError, ValueError) as error:  # the latter for names that no file can have
-        reason = f"there is no folder {path.parent}" if _no_folder(path.parent) else _reason(error)
-        raise ExportError(f"{path}: cannot be written: {reason}") from None
+        reason = f"there is no folder {_named(path.parent)}" if _no_folder(path.parent) else _reason(error)
+        raise ExportError(f"{_named(path)}: cannot be written: {reason}") from None
 
 
 def _replace(path: Path, data: bytes) -> None:
@@ -109,9 +109,14 @@ def check_target(path: str | Path | None, suffixes: Collection[str] = ()) -> Non
         return
     path = Path(path)
     if suffixes and path.suffix.lower() not in suffixes:
-        raise ExportError(f"{path}: allowed are names that end in {', '.join(suffixes)}")
+        raise ExportError(f"{_named(path)}: allowed are names that end in {', '.join(suffixes)}")
     if _no_folder(path.parent):
-        raise ExportError(f"{path}: cannot be written: there is no folder {path.parent}")
+        raise ExportError(f"{_named(path)}: cannot be written: there is no folder {_named(path.parent)}")
+
+
+def _named(path: Path) -> str:
+    """A path with its control characters as Python writes them: a refusal is one line."""
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in str(path))
 
 
 def _no_folder(folder: Path) -> bool:

@@ -27,6 +27,7 @@ from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES, StateLayout
 Array = NDArray[np.float64]
 Range = tuple[float, float]
 NOT_PHYSICS = ("name", "airfoil", "collective_range", "cyclic_range", "swashplate_rate")  # of a rotor, for the model
+LEAST_DENSITY = 1e-12  # kg/m^3, less than at 300 km: a vacuum
 
 
 @dataclass(frozen=True)
@@ -415,7 +416,8 @@ class Aircraft:
         row[P.INVERSE_BLADES], row[P.INVERSE_TIP_SPEED] = 1 / rotor.blades, 1 / (rotor.speed * rotor.radius)
         density, tip_speed = self.environment.air_density, rotor.speed * rotor.radius
         # in vacuum the coefficients are zero, not zero over zero
-        row[P.LOAD_SCALE] = 1 / (density * math.pi * rotor.radius**2 * tip_speed**2) if density > 0 else 0.0
+        pressure = density * math.pi * rotor.radius**2 * tip_speed**2
+        row[P.LOAD_SCALE] = 1 / pressure if density > LEAST_DENSITY else 0.0
         return row
 
 

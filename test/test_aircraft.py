@@ -737,6 +737,7 @@ NUMBER_PATHS = [path for path in all_paths(SBS) if type(get(SBS, path)) in (int,
 @example(("environment", "kinematic_viscosity"), 5e-324)
 @example(("rotors", 0, "chord", "root"), 5e-324)
 @example(("body", "inertia", 0, 0), 1e308)
+@example(("environment", "air_density"), 2e-313)
 def test_an_aircraft_that_loads_has_a_finite_model(path, value):
     """Every number that passes the checks is one that the model can be made of."""
     with np.errstate(over="raise", invalid="raise", divide="raise"):

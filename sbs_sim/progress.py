@@ -27,7 +27,10 @@ def progress_bar(unit: str, total: float | None = None) -> Iterator[Callable[...
     with tqdm(total=total, unit=unit, file=sys.stderr, leave=False) as bar:
 
         def progress(*told: Any) -> None:
-            done, bar.total = told[-2:]
+            done, known = told[-2:]
             bar.update(done - bar.n)  # less than nothing where work begins again
+            if known != bar.total:
+                bar.total = known
+                bar.refresh()  # which else waits for the next tenth of a second
 
         yield progress

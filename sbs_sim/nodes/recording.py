@@ -108,7 +108,7 @@ class Recording(Component):
             return ""
         log.close()
         if log.fault:
-            raise RecordingError(f"the log has ended before the flight: {log.fault}")
+            raise RecordingError(f"the log ends before the flight: {log.fault}")
         return str(log.path)
 
     def _on_record(self, request: Record.Request, response: Record.Response) -> Record.Response:

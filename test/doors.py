@@ -997,7 +997,7 @@ DOORS = (
     Door("aircraft file, bytes", mutated(YAML_TEXTS, PIECES), check_yaml, 2.0),
     Door("aircraft file, values", st.lists(st.tuples(PATHS, ANYTHING), max_size=3), check_yaml_values, 2.0),
     Door("airfoil file", mutated([AIRFOIL, _small_airfoil(), _small_airfoil()], CSV_PIECES), check_airfoil, 2.0),
-    Door("log, bytes", mutated([SMALL_LOG]), check_log, 1.5),
+    Door("log, bytes", mutated([SMALL_LOG]), check_log, 0.6),
     Door("log, contents", foreign_logs(), check_foreign, 0.5),
     Door("command lines", command_lines(), check_command, 2.0),
 )

@@ -404,8 +404,8 @@ REFUSED = {
         "2.2",
         "body.inertia[1][1] = '2.2': allowed is a number",
     ),
-    "no mass": (("body", "mass"), 0.0, "body.mass = 0.0: allowed is > 0"),
-    "negative mass": (("body", "mass"), -20.62, "body.mass = -20.62: allowed is > 0"),
+    "no mass": (("body", "mass"), 0.0, "body.mass = 0.0: allowed is >= 0.001"),
+    "negative mass": (("body", "mass"), -20.62, "body.mass = -20.62: allowed is >= 0.001"),
     "mass that is not a number": (("body", "mass"), math.nan, "body.mass = nan: allowed is a finite number"),
     "infinite mass": (("body", "mass"), math.inf, "body.mass = inf: allowed is <= 1000000.0"),
     "inertia that is not a number": (
@@ -738,6 +738,7 @@ NUMBER_PATHS = [path for path in all_paths(SBS) if type(get(SBS, path)) in (int,
 @example(("rotors", 0, "chord", "root"), 5e-324)
 @example(("body", "inertia", 0, 0), 1e308)
 @example(("environment", "air_density"), 2e-313)
+@example(("rotors", 1, "speed_rpm"), 3e-228)
 def test_an_aircraft_that_loads_has_a_finite_model(path, value):
     """Every number that passes the checks is one that the model can be made of."""
     with np.errstate(over="raise", invalid="raise", divide="raise"):

@@ -8,6 +8,11 @@ settings.register_profile("no_deadline", deadline=None)
 settings.load_profile("no_deadline")
 
 
+def pytest_collection_modifyitems(items):
+    """The files whose tests wait for processes and their discovery first: at the end nobody should wait for them."""
+    items.sort(key=lambda item: not hasattr(item.module, "DOMAINS"))
+
+
 @pytest.fixture(scope="session")
 def sbs():
     """The aircraft to fly."""

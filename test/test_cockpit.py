@@ -561,27 +561,27 @@ def test_a_log_that_is_none_is_refused_and_the_view_stays(flying, page):
     assert page.get_by_text("hover_step.mcap paused").count() == 1
 
 
+# The last one with the page, which it takes to another cockpit: two that draw at once would starve each other.
 def test_logs_are_shown_without_a_simulator_and_a_live_flight_when_there_is_one(tmp_path, page):
     logs = tmp_path / "mine"
     logs.mkdir()
     (logs / "hover_step.mcap").write_bytes(HOVER_STEP.read_bytes())
-    size = dict(zip(("width", "height"), browser.SIZE, strict=True))
-    with world(next(DOMAINS), tmp_path) as made, page.context.browser.new_page(viewport=size) as other:
+    with world(next(DOMAINS), tmp_path) as made:
         port = free_port()
         cockpit = made.start("cockpit", arguments=["--logs", str(logs), "--port", str(port)])
         made.client.until(lambda: "cockpit: http" in cockpit.output or not cockpit.running, "the address")
-        other.goto(f"http://127.0.0.1:{port}")
+        page.goto(f"http://127.0.0.1:{port}")
 
         def shown(text):
-            other.get_by_text(text).first.wait_for(timeout=1e3 * PATIENCE)
+            page.get_by_text(text).first.wait_for(timeout=1e3 * PATIENCE)
 
         def choose(source):
-            other.get_by_label("Source").click()
-            other.get_by_role("option", name=source).click()
+            page.get_by_label("Source").click()
+            page.get_by_role("option", name=source).click()
 
         shown("NO SIMULATOR")
         shown("No simulator flies")
-        other.get_by_role("tab", name="Logs").click()
+        page.get_by_role("tab", name="Logs").click()
         choose("hover_step.mcap")
         shown("hover_step.mcap, no simulator")
         shown("hover_step.mcap paused")  # at its end

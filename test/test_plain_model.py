@@ -6,6 +6,7 @@ import numpy as np
 import plain_model
 import pytest
 from plain_model import plain_derivative, random_state, split_state, table6_aircraft
+from scipy.optimize import brentq
 
 VACUUM = {"air_density": 0.0}
 CALM = np.zeros(3)
@@ -605,13 +606,10 @@ def test_steady_inflow_of_hover_is_momentum_theory(expansion):
     def rate(lambda0):
         return plain_derivative(ac, level_state(ac, lambda0), swash, np.zeros(2), CALM)
 
-    low, high = 0.0, 0.3
-    for _ in range(40):
-        middle = (low + high) / 2
-        low, high = (middle, high) if rate(middle)[0][-3] > 0 else (low, middle)
-    _, loads = rate(low)
+    lambda0 = brentq(lambda lambda0: rate(lambda0)[0][-3], 0.0, 0.3, xtol=1e-12)
+    _, loads = rate(lambda0)
     rotor = ac.rotors[1]
-    v = low * rotor.speed * rotor.radius
+    v = lambda0 * rotor.speed * rotor.radius
     total = loads["thrust"][1] + loads["duct"][1]
     assert loads["thrust"][1] > 10
     assert total == pytest.approx(1.225 * np.pi * rotor.radius**2 * v**2 / expansion, rel=1e-6)

@@ -1125,13 +1125,13 @@ def folder(tmp_path_factory):
 
 
 @given(st.sampled_from(crash.KINDS), st.integers(0, 2**32))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_damage_costs_no_more_than_what_it_touches(original, folder, kind, seed):
     crash.damage_one(folder, original, kind(original.data, random.Random(seed)))
 
 
 @given(st.data(), st.integers(2, 6))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_several_damages_never_yield_what_was_not_recorded(original, folder, data, count):
     damaged = original.data
     for _ in range(count):
@@ -1141,8 +1141,8 @@ def test_several_damages_never_yield_what_was_not_recorded(original, folder, dat
     crash.damage_one(folder, original, (damaged, 0, len(original.data), 0))
 
 
-def test_every_single_byte_of_a_small_file(tmp_path):
-    """Each byte wrong, and the file cut at many places."""
+def test_every_field_of_a_small_file(tmp_path):
+    """Every third byte wrong, some of each field whose length is not one, and the file cut at many places."""
     path = tmp_path / "log.mcap"
     with new_log(path, metadata={"mine": {"key": "value"}}, attachments={"file": b"content"}) as log:
         channel = log.add_channel("/number", "test_msgs/msg/Number", NUMBER, "")
@@ -1154,10 +1154,10 @@ def test_every_single_byte_of_a_small_file(tmp_path):
     place = data.index(b"\x04\0\0\0zstd") - 37
     span = (place, place + 9 + struct.unpack_from("<Q", data, place + 1)[0])
     original = crash.Original(data, messages, {span: set(messages)}, whole.metadata, whole.attachments)
-    for offset in range(len(data)):
+    for offset in range(0, len(data), 3):
         damaged = data[:offset] + bytes([data[offset] ^ 0xFF]) + data[offset + 1 :]
         crash.damage_one(tmp_path, original, (damaged, offset, offset + 1, 0))
-        if offset % 3 == 0:
+        if offset % 9 == 0:
             crash.damage_one(tmp_path, original, (data[:offset], offset, len(data), 0))
 
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from sbs_sim.model.state import Part, part_of
 
@@ -219,6 +218,8 @@ def _assign(found: Sequence[Mode], groups: dict[str, list[int]]) -> list[str]:
 
 def _match(found: Sequence[Mode], slots: Sequence[str], shares: dict[str, list[float]]) -> list[list[str]]:
     """Slots of each mode, two of a pair, that maximise the sum of the shares; the larger share first."""
+    from scipy.optimize import linear_sum_assignment  # here: it takes a quarter of a second, and few need it
+
     owners = [i for i, mode in enumerate(found) for _ in range(1 + mode.is_oscillatory)]
     gain = np.array([shares[slot] for slot in slots]).T[owners].reshape(len(owners), len(slots))
     result: list[list[str]] = [[] for _ in found]

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+import scipy.optimize  # noqa: F401  # now: in mid flight the first linearization would hold the interpreter to load it
 from rclpy.action.server import ServerGoalHandle
 
 from sbs_msgs.action import Sweep

@@ -9,13 +9,13 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from rclpy.qos import QoSProfile  # noqa: E402
 from ros_harness import DOMAINS, controls_message, world  # noqa: E402
 
-from sbs_msgs.msg import Controls, SwashplateArray  # noqa: E402
+from sbs_msgs.msg import BodyState, Controls, SwashplateArray  # noqa: E402
 
 
 @pytest.fixture(scope="module")
 def flight(tmp_path_factory):
     with world(next(DOMAINS), tmp_path_factory.mktemp("arrivals")) as made:
-        for topic, kind in (("diagnostics", DiagnosticArray), ("swashplate", SwashplateArray)):
+        for topic, kind in (("state", BodyState), ("diagnostics", DiagnosticArray), ("swashplate", SwashplateArray)):
             made.client.watch(topic, kind)
         made.start("simulator", record="off")
         made.client.next("state")

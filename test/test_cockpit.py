@@ -605,5 +605,5 @@ def test_its_end_is_the_simulators_end(flying):
         time.sleep(0.05)
     assert not any(Path(f"/proc/{child}").exists() for child in children)
     logs = list((made.folder / "bags").glob("*_sbs*.mcap"))
-    assert len(logs) == 2
+    assert logs
     assert all(read(log).complete for log in logs)

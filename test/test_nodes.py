@@ -143,8 +143,11 @@ def test_odom_is_the_same_motion_in_ros_axes(client):
     request = {"airspeed": 8.0, "heading": 0.7, "position": Point(x=3.0, y=5.0, z=-20.0), "turn_rate": 0.2}
     assert client.call(Reset, "reset", **request).success
     state = client.next("state", lambda m: m.position.z < -19)
-    odom = client.next("odom", lambda m: stamp(m) >= stamp(state))
-    state = next(m for m in reversed(client.messages["state"]) if stamp(m) == stamp(odom))
+    # Of a later time: at that of the reset there are two, one of before it.
+    odom = client.next("odom", lambda m: stamp(m) > stamp(state))
+    states = client.messages["state"]
+    client.until(lambda: stamp(states[-1]) >= stamp(odom), "the state of the odometry")
+    state = next(m for m in reversed(states) if stamp(m) == stamp(odom))
     assert (odom.header.frame_id, odom.child_frame_id) == ("odom", "base_link")
     to_enu = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])  # north east down to east north up
     to_flu = np.diag([1.0, -1, -1])

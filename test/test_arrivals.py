@@ -114,11 +114,13 @@ def test_a_killed_mixer_is_missed_and_a_new_one_joins(tmp_path, hover):
     """With -9 nobody says goodbye: the flight goes on, tells what is missing, and takes a new mixer as it comes."""
     with world(next(DOMAINS), tmp_path) as made:
         client = made.client
-        for topic, kind in (("diagnostics", DiagnosticArray), ("swashplate", SwashplateArray)):
+        for topic, kind in (("state", BodyState), ("diagnostics", DiagnosticArray), ("swashplate", SwashplateArray)):
             client.watch(topic, kind)
         simulator = made.start("simulator", components="[simulator]")
         mixer = made.start("control_mixer")
-        client.publish_until("controls", controls_message(hover.controls), "swashplate", lambda _: True)
+        # Until the simulator hears the mixer, not only the test.
+        climb = controls_message(hover.controls + [0.02, 0.0, 0.0, 0.0])
+        client.publish_until("controls", climb, "state", lambda m: m.velocity.z < -0.02)
         mixer.kill()
 
         def missed(array):

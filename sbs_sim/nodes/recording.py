@@ -103,10 +103,11 @@ class Recording(Component):
         RecordingError
             It is not whole.
         """
-        log, self._log, self._open = self._log, None, False
+        log, self._open = self._log, False
         if log is None:
             return ""
-        log.close()
+        log.close()  # before it is no longer the present one: who sees that there is none may read it
+        self._log = None
         if log.fault:
             raise RecordingError(f"the log ends before the flight: {log.fault}")
         return str(log.path)

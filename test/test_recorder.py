@@ -274,6 +274,31 @@ def test_logs_begun_in_mid_flight_come_again_bit_for_bit(tmp_path, hover):
     assert read(second)["state"].time[0] > read(first)["state"].time[-1]
 
 
+def test_logs_that_end_as_they_have_begun_come_again(tmp_path):
+    """Each with its own start and states, though what is published before them is still on its way."""
+    with world(next(DOMAINS), tmp_path) as made:
+        made.client.watch("status", SimulationStatus)
+        made.start("simulator", record="off")
+        made.client.next("status")
+        assert made.client.call(SetBool, "pause", data=True).success
+        steps = made.client.node.create_client(Step, "step")
+        made.client.until(steps.service_is_ready, "step")
+        for number in range(6):
+            path = str(tmp_path / f"{number}.mcap")
+            flown = steps.call_async(Step.Request(ticks=100))
+            answer = made.client.call(Record, "record", record=True, path=path)
+            assert (answer.success, answer.path) == (True, path), answer.message
+            assert made.client.call(Record, "record", record=False).success
+            made.client.until(flown.done, "the steps")
+    for number in range(6):
+        log = read(tmp_path / f"{number}.mcap")
+        assert log.complete
+        assert log["events"]["kind"][0] == "start"
+        assert list(log["events"]["kind"]).count("start") == 1
+        assert log["state"].time[0] == log["events"].time[0]
+        assert verify(flight_of(log)).identical
+
+
 def test_a_log_that_begins_while_paused_after_a_fault_comes_again(tmp_path):
     """The flight has ended at the ground within a tick; a reset flies on."""
     path = tmp_path / "late.mcap"

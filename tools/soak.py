@@ -7,13 +7,15 @@ turbulence, step by step. Then minutes of real time in which eight clients call 
 open files of the simulator are taken all along and drawn (memory.svg); no request may stay without an answer, and the
 logs must be flown again bit for bit. The exit code is 1 if something of that does not hold.
 
-A flight of hours makes a log of about 50 MB an hour in the folder; it is verified and deleted.
+A flight of hours makes a log of about 50 MB an hour in the folder, and the clients begin and end others; all are
+verified, and deleted if they come again.
 """
 
 import argparse
 import contextlib
 import json
 import random
+import re
 import sys
 import threading
 import time
@@ -33,7 +35,7 @@ from ros_harness import DOMAINS, Client, World, controls_message, world  # noqa:
 from std_srvs.srv import SetBool  # noqa: E402
 
 from sbs_msgs.msg import BodyState, Controls, SimulationStatus, SwashplateArray  # noqa: E402
-from sbs_msgs.srv import Linearize, Reset, SetWind, Step, Trim  # noqa: E402
+from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim  # noqa: E402
 from sbs_sim import Aircraft  # noqa: E402
 from sbs_sim.model.frames import quaternion_to_euler  # noqa: E402
 
@@ -160,6 +162,7 @@ def requests(chance: random.Random) -> tuple[str, Any, dict[str, Any]]:
             ("set_wind", SetWind, {}),
             ("pause", SetBool, {"data": chance.random() < 0.5}),
             ("step", Step, {"ticks": chance.choice([0, 1, 5, 50, 5000])}),
+            ("record", Record, {"record": chance.random() < 0.5, "path": chance.choice(["", "/nowhere/a.mcap"])}),
         ]
     )
 
@@ -218,6 +221,20 @@ def call(made: World, minutes: float, log: Path) -> tuple[list[str], bool, np.nd
     return words, flat and missed == 0 and ended == 0, rows
 
 
+def verified(logs: list[Path]) -> tuple[str, bool]:
+    """What flying the logs again says of them, and whether all come again bit for bit; then they are deleted."""
+    size, states, wrong = 0.0, 0, []
+    for log in logs:
+        said, size = replayed(log, "--verify"), size + log.stat().st_size / 1e6
+        if match := re.match(r"identical, (\d+) states", said):
+            states += int(match[1])
+            log.unlink()
+        else:
+            wrong.append(f"{log.name} {said}")
+    text = f"{len(logs)} logs of {size:.1f} MB, {len(wrong)} not flown again bit for bit, {states} states"
+    return "; ".join([text, *wrong[:3]]), not wrong
+
+
 def draw(parts: dict[str, np.ndarray], path: Path) -> None:
     """Memory and open files over time."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -249,11 +266,9 @@ def main() -> int:
         log.unlink(missing_ok=True)
         with world(next(DOMAINS), arguments.out) as made:
             words, good, parts[name] = part(made, amount, log)
-        said = replayed(log, "--verify")
-        good = good and said.startswith("identical")
-        size = log.stat().st_size / 1e6
-        log.unlink()
-        print(f"{name}: {'good' if good else 'WRONG'}: {'; '.join(words)}; log of {size:.1f} MB {said}", flush=True)
+        text, whole = verified([log, *(arguments.out / "bags").glob("*.mcap")])
+        good = good and whole
+        print(f"{name}: {'good' if good else 'WRONG'}: {'; '.join(words)}; {text}", flush=True)
         wrong += not good
     draw(parts, arguments.out / "memory.svg")
     (arguments.out / "memory.json").write_text(json.dumps({name: rows.tolist() for name, rows in parts.items()}))

@@ -80,12 +80,14 @@ class Outputs:
                 self._inflow.publish(self._messages.inflow, now, wait)
                 self._odom.publish(self._messages.odom, now, wait)
             self._publish_status(report, stamp, wait)
+            if self._log is not None:
+                self._log.end_instant()
 
     def _tell_event(self, event: Event, now: float, wait: bool) -> None:
         """Publish and record an event: no flight can be flown again without it."""
         message = event_message(event, self._loop.step_size)
         if event.kind == FlightEvent.START and self._log is not None:
-            self._log.open()
+            self._log.take_start()
         if event.kind == FlightEvent.START and self._begun:
             # that of a log in mid-flight: for everybody else nothing has begun
             self._events.record(message, now, wait, essential=True)

@@ -18,6 +18,8 @@ from sbs_sim.simulation import Simulation
 if TYPE_CHECKING:
     from sbs_sim.nodes.recorder import Recorder
 
+START_PATIENCE = 10.0  # s until a start that was asked for is written
+
 
 class Recording(Component):
     """See the module. A log begins with the start that the flight hands out for it, and not before.
@@ -37,7 +39,11 @@ class Recording(Component):
         self._topics: list[tuple[str, Any, QoSProfile]] = []
         self._lock = threading.Lock()  # topics may be added while a log begins
         self._log: Recorder | None = None
+        # Starts are counted as the flight hands them out, its own is 0: that of a log which has ended already is not
+        # taken for the start of the next one.
+        self._handed_out, self._awaited = 0, 0
         self._open = False  # the start of the flight is in the log
+        self._has_begun = threading.Event()  # and all of that instant
         self._channels: list[int] = []  # of the log, by our own numbers
         self.create_service(Record, "record", self._on_record)
 
@@ -57,9 +63,16 @@ class Recording(Component):
         if self._open and log is not None:
             log.write(channels[channel], time, data, wait, essential)
 
-    def open(self) -> None:
-        """From now on what is written gets into the log that waits: called with the start of the flight in hand."""
-        self._open = self._log is not None
+    def take_start(self) -> None:
+        """From now on what is written gets into the log, if this is the start of the flight that it waits for."""
+        if self._handed_out == self._awaited:
+            self._open = self._log is not None
+        self._handed_out += 1
+
+    def end_instant(self) -> None:
+        """All that belongs to an instant of the flight has been written."""
+        if self._open:
+            self._has_begun.set()
 
     @property
     def path(self) -> str:
@@ -78,8 +91,8 @@ class Recording(Component):
 
     # --------------------------------------------------------------------------------------------- beginning and end
 
-    def begin(self, record: str) -> None:
-        """Make a log, which waits for the start of the flight; `record` is as for `Recorder`.
+    def begin(self, record: str, start: int = 0) -> None:
+        """Make a log, which waits for that start of the flight; `record` is as for `Recorder`.
 
         Raises
         ------
@@ -93,7 +106,8 @@ class Recording(Component):
         log = Recorder(record, self._simulation, self._parameters)
         with self._lock:
             self._channels = [log.channel(*topic) for topic in self._topics]
-            self._log = log
+            self._awaited, self._log = start, log
+            self._has_begun.clear()
 
     def end(self) -> str:
         """End the log; its path, empty if there is none.
@@ -125,10 +139,13 @@ class Recording(Component):
             if not self.end():
                 raise RecordingError("record = false: nothing is recorded")
             return
-        self.begin(request.path)
+        self.begin(request.path, start=self._awaited + 1)
         try:
             self._loop.begin_log()
+            if not self._has_begun.wait(START_PATIENCE):
+                raise RecordingError(f"the flight has not handed out its start within {START_PATIENCE:g} s")
         except SbsError:
+            self._open = False
             log, self._log = self._log, None
             if log is not None:
                 log.discard()

@@ -44,6 +44,7 @@ WARM = 0.2  # share of the time after which the memory must not grow any more
 GROWTH = 0.05  # of it
 CLIENTS = 8
 RATE = 12.5  # Hz, of states and controls in the long flight: each of them is published, recorded and answered
+LONGEST_REPLAY = 6 * 3600.0  # s, of 8 h that take a quarter of an hour on a quiet machine
 PATIENCE = 60.0  # s for an answer while seven others ask
 
 
@@ -225,7 +226,7 @@ def verified(logs: list[Path]) -> tuple[str, bool]:
     """What flying the logs again says of them, and whether all come again bit for bit; then they are deleted."""
     size, states, wrong = 0.0, 0, []
     for log in logs:
-        said, size = replayed(log, "--verify"), size + log.stat().st_size / 1e6
+        said, size = replayed(log, "--verify", timeout=LONGEST_REPLAY), size + log.stat().st_size / 1e6
         if match := re.match(r"identical, (\d+) states", said):
             states += int(match[1])
             log.unlink()

@@ -11,7 +11,7 @@ import os
 import struct
 import zlib
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,10 @@ class FileBuilder:
         self._definitions_due = 0
         self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
         self._counts: defaultdict[int, int] = defaultdict(int)
-        self._chunks: list[ChunkIndex] = []
+        # As they will be written: in a flight of hours they are tens of thousands, and as objects tens of megabytes.
+        self._chunk_indices = bytearray()
+        self._chunk_count = 0
+        self._first_time, self._last_time = 2**64 - 1, 0  # the latest and the earliest that there are
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
 
@@ -137,7 +140,7 @@ class FileBuilder:
         if len(channels) != self._defined:
             self._defined = len(channels)
             self._definitions_due = DEFINITIONS_TWICE
-        if not self._definitions_due and len(self._chunks) % DEFINITIONS_PERIOD:
+        if not self._definitions_due and self._chunk_count % DEFINITIONS_PERIOD:
             return b""
         self._definitions_due = max(0, self._definitions_due - 1)
         return b"".join(map(serialize, [*schemas.values(), *channels.values()]))
@@ -152,7 +155,7 @@ class FileBuilder:
             self._counts[channel] += len(entries)
             offsets[channel] = self.size + builder.count
             MessageIndex(channel, entries).write(builder)
-        self._chunks.append(
+        self._chunk_indices += serialize(
             ChunkIndex(
                 chunk_length=chunk_length,
                 chunk_start_offset=self.size,
@@ -165,6 +168,9 @@ class FileBuilder:
                 uncompressed_size=chunk.uncompressed_size,
             )
         )
+        self._chunk_count += 1
+        self._first_time = min(self._first_time, chunk.message_start_time)
+        self._last_time = max(self._last_time, chunk.message_end_time)
         return builder.end()
 
     def finish(self, name: str, custom_data: dict[str, str]) -> bytes:
@@ -187,36 +193,31 @@ class FileBuilder:
             attachment_count=len(self._attachments),
             channel_count=len(self.channels),
             channel_message_counts={channel: self._counts[channel] for channel in self.channels},
-            chunk_count=len(self._chunks),
+            chunk_count=self._chunk_count,
             message_count=sum(self._counts.values()),
-            message_end_time=max((chunk.message_end_time for chunk in self._chunks), default=0),
-            message_start_time=min((chunk.message_start_time for chunk in self._chunks), default=0),
+            message_end_time=self._last_time,
+            message_start_time=self._first_time if self._chunk_count else 0,
             metadata_count=len(self._metadata),
             schema_count=len(self.schemas),
         )
 
     def _summary(self) -> bytes:
         """Summary, its offsets, and the footer with the checksum of all that."""
-        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
-            (Opcode.SCHEMA, list(self.schemas.values())),
-            (Opcode.CHANNEL, list(self.channels.values())),
-            (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, self._chunks),
-            (Opcode.ATTACHMENT_INDEX, self._attachments),
-            (Opcode.METADATA_INDEX, self._metadata),
+        groups = [
+            (Opcode.SCHEMA, _serialized(self.schemas.values())),
+            (Opcode.CHANNEL, _serialized(self.channels.values())),
+            (Opcode.STATISTICS, serialize(self._statistics())),
+            (Opcode.CHUNK_INDEX, bytes(self._chunk_indices)),
+            (Opcode.ATTACHMENT_INDEX, _serialized(self._attachments)),
+            (Opcode.METADATA_INDEX, _serialized(self._metadata)),
         ]
-        builder = RecordBuilder()
-        offsets = []
+        place, offsets = self.size, []
         for opcode, records in groups:
-            start = builder.count
-            for record in records:
-                record.write(builder)
             if records:
-                offsets.append(SummaryOffset(opcode, self.size + start, builder.count - start))
-        offsets_start = self.size + builder.count
-        for offset in offsets:
-            offset.write(builder)
-        summary = builder.end()
+                offsets.append(SummaryOffset(opcode, place, len(records)))
+            place += len(records)
+        offsets_start = place
+        summary = b"".join(records for _, records in groups) + _serialized(offsets)
         unsigned = serialize(Footer(self.size, offsets_start, 0))[:-4]
         return summary + unsigned + struct.pack("<I", zlib.crc32(summary + unsigned)) + MAGIC
 
@@ -289,6 +290,10 @@ def serialize(record: McapRecord) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
     return builder.end()
+
+
+def _serialized(records: Iterable[McapRecord]) -> bytes:
+    return b"".join(map(serialize, records))
 
 
 def metadata_checksum(name: str, data: dict[str, str]) -> str:

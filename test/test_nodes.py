@@ -33,6 +33,7 @@ from sbs_msgs.msg import (  # noqa: E402
 )
 from sbs_msgs.srv import Reset, SetWind, Step  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
+from sbs_sim.nodes.host import SERVICE_QOS  # noqa: E402
 
 TOPICS = {
     "state": BodyState,
@@ -331,6 +332,18 @@ def test_the_mixer_clips_says_so_once_and_follows_the_paper(flight, client):
     )
     assert moved.rotors[0].longitudinal_cyclic == pytest.approx(0.01)
     assert moved.rotors[0].collective == pytest.approx(math.radians(20.0))
+
+
+def test_a_burst_of_requests_is_answered_to_the_last(flight, client):
+    """They wait while others are answered, and the answers wait for who is slow to look."""
+    service = client.node.create_client(SetWind, "set_wind", qos_profile=SERVICE_QOS)
+    client.until(service.service_is_ready, "set_wind")
+    calm = client.next("status")
+    answers = [service.call_async(SetWind.Request(velocity=Vector3(x=0.01 * i))) for i in range(200)]
+    time.sleep(0.5)
+    client.until(lambda: all(answer.done() for answer in answers), "200 answers")
+    assert all(answer.result().success for answer in answers)
+    assert client.next("status").steps > calm.steps
 
 
 def test_a_fault_pauses_and_a_reset_cures_it(flight, client):

@@ -154,10 +154,10 @@ def system(parts: tuple[str, ...] = PARTS, **parameters: Any) -> Iterator[System
         yield System(made, parts, **parameters)
 
 
-def replayed(log: Path, *options: str, timeout: float = 900.0) -> str:
-    """What `replay` says of a log within a time [s]."""
+def replayed(log: Path, *options: str) -> str:
+    """What `replay` says of a log."""
     command = [sys.executable, str(EXECUTABLES / "replay"), *options, str(log)]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False)
     return (ended.stdout + ended.stderr).strip().splitlines()[-1]
 
 

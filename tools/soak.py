@@ -15,7 +15,6 @@ import argparse
 import contextlib
 import json
 import random
-import re
 import sys
 import threading
 import time
@@ -28,7 +27,6 @@ import psutil
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "test"), str(ROOT / "tools")]
 
-from faults import replayed  # noqa: E402
 from geometry_msgs.msg import Point, Vector3  # noqa: E402
 from hover_controller import HoverLaw  # noqa: E402
 from ros_harness import DOMAINS, Client, World, controls_message, world  # noqa: E402
@@ -37,14 +35,17 @@ from std_srvs.srv import SetBool  # noqa: E402
 from sbs_msgs.msg import BodyState, Controls, SimulationStatus, SwashplateArray  # noqa: E402
 from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim  # noqa: E402
 from sbs_sim import Aircraft  # noqa: E402
+from sbs_sim.errors import SbsError  # noqa: E402
 from sbs_sim.model.frames import quaternion_to_euler  # noqa: E402
+from sbs_sim.nodes.host import SERVICE_QOS  # noqa: E402
+from sbs_sim.recording import read  # noqa: E402
+from sbs_sim.recording.flight import flight_of, verify  # noqa: E402
 
 TURBULENCE = Vector3(x=1.5, y=1.5, z=0.8)  # m/s, moderate air near the ground
 WARM = 0.2  # share of the time after which the memory must not grow any more
 GROWTH = 0.05  # of it
 CLIENTS = 8
 RATE = 12.5  # Hz, of states and controls in the long flight: each of them is published, recorded and answered
-LONGEST_REPLAY = 6 * 3600.0  # s, of 8 h that take a quarter of an hour on a quiet machine
 PATIENCE = 60.0  # s for an answer while seven others ask
 
 
@@ -182,7 +183,7 @@ class Caller(threading.Thread):
         while time.monotonic() < self._end:
             name, kind, fields = requests(self._chance)
             if name not in ends:
-                ends[name] = self._client.node.create_client(kind, name)
+                ends[name] = self._client.node.create_client(kind, name, qos_profile=SERVICE_QOS)
                 self._client.until(ends[name].service_is_ready, name)
             begin = time.monotonic()
             answer = ends[name].call_async(kind.Request(**fields))
@@ -226,12 +227,17 @@ def verified(logs: list[Path]) -> tuple[str, bool]:
     """What flying the logs again says of them, and whether all come again bit for bit; then they are deleted."""
     size, states, wrong = 0.0, 0, []
     for log in logs:
-        said, size = replayed(log, "--verify", timeout=LONGEST_REPLAY), size + log.stat().st_size / 1e6
-        if match := re.match(r"identical, (\d+) states", said):
-            states += int(match[1])
+        size += log.stat().st_size / 1e6
+        try:
+            found = verify(flight_of(read(log)))
+        except SbsError as error:
+            wrong.append(f"{log.name}: {error}")
+            continue
+        states += found.states
+        if found.identical:
             log.unlink()
         else:
-            wrong.append(f"{log.name} {said}")
+            wrong.append(f"{log.name}: {found.first}")
     text = f"{len(logs)} logs of {size:.1f} MB, {len(wrong)} not flown again bit for bit, {states} states"
     return "; ".join([text, *wrong[:3]]), not wrong
 

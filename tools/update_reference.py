@@ -245,8 +245,9 @@ def topics() -> str:
 
 SERVICES = """
 What is wrong with a request is answered with `success` false and a `message` that names field, value and allowed range,
-and changes nothing. The defaults of a request are those of the interface: what is left out has them. `replay` serves
-`pause` too.
+and changes nothing. The defaults of a request are those of the interface: what is left out has them. A thousand requests
+wait for their turn; a client among many needs a history as long, or [loses answers](../robustness.md#services-and-the-action)
+while it is busy. `replay` serves `pause` too.
 """
 LABELS = {"srv": ("Request", "Answer"), "action": ("Goal", "Result", "Feedback")}
 

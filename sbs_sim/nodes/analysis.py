@@ -24,7 +24,7 @@ from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.nodes.conversions import model_message, sweep_messages, trim_message
-from sbs_sim.nodes.host import LATCHED_QOS, Component, Log, Parameter, Topic, declare, run
+from sbs_sim.nodes.host import LATCHED_QOS, SERVICE_QOS, Component, Log, Parameter, Topic, declare, run
 from sbs_sim.nodes.threaded_action import ThreadedActionServer
 
 PARAMETERS = {
@@ -57,8 +57,8 @@ class Analysis(Component):
             model_message(self._aircraft, linearize(self._aircraft))
         self._trim_point = Topic(self, TrimPoint, "trim_point", LATCHED_QOS, log)
         self._linear_model = Topic(self, LinearModel, "linear_model", LATCHED_QOS, log)
-        self.create_service(Trim, "trim", self._on_trim)
-        self.create_service(Linearize, "linearize", self._on_linearize)
+        self.create_service(Trim, "trim", self._on_trim, qos_profile=SERVICE_QOS)
+        self.create_service(Linearize, "linearize", self._on_linearize, qos_profile=SERVICE_QOS)
         self._sweeps = ThreadedActionServer(self, Sweep, "sweep", self._sweep, self.workers)
 
     def stop(self) -> None:

@@ -36,6 +36,9 @@ DISCOVERY = 1.5  # s in which others that run already are found
 END_PATIENCE = 3.0  # s that a thread may take to end
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# Requests wait while one before them is answered. In DDS every client gets the answers to all, and one that is slow to
+# look loses its own when so many others have come: ROS keeps ten unless it is told otherwise.
+SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 # the last message is kept for whoever comes later
 LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 

@@ -19,7 +19,7 @@ from sbs_msgs.srv import Linearize
 from sbs_sim.errors import PilotError, SbsError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
-from sbs_sim.nodes.host import COMMAND_QOS, COMPLAINT_PERIOD, Parameter, Refusals, declare, run
+from sbs_sim.nodes.host import COMMAND_QOS, COMPLAINT_PERIOD, SERVICE_QOS, Parameter, Refusals, declare, run
 from sbs_sim.nodes.pilot import PilotNode
 from sbs_sim.nodes.pilot_conversions import hover_model, to_target
 from sbs_sim.pilot.hover_hold import LIMITS, HoverHold, design
@@ -51,7 +51,7 @@ class HoverHoldNode(PilotNode):
 
     def _linearized(self, patience: float) -> LinearModel:
         """Linear model of hover, from the service."""
-        client = self.create_client(Linearize, "linearize")
+        client = self.create_client(Linearize, "linearize", qos_profile=SERVICE_QOS)
         self.get_logger().info("asking linearize for the model of hover")
         end = time.monotonic() + patience
         while not client.wait_for_service(ASKING):

@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from sbs_msgs.srv import Record
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.flight_loop import FlightLoop
-from sbs_sim.nodes.host import Component
+from sbs_sim.nodes.host import SERVICE_QOS, Component
 from sbs_sim.simulation import Simulation
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Recording(Component):
         self._open = False  # the start of the flight is in the log
         self._has_begun = threading.Event()  # and all of that instant
         self._channels: list[int] = []  # of the log, by our own numbers
-        self.create_service(Record, "record", self._on_record)
+        self.create_service(Record, "record", self._on_record, qos_profile=SERVICE_QOS)
 
     # ------------------------------------------------------------------------------------- what the nodes write into
 

@@ -17,7 +17,7 @@ from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim
 from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.nodes.conversions import controls_of
-from sbs_sim.nodes.host import COMMAND_QOS
+from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS
 
 Array = NDArray[np.float64]
 Answer = tuple[bool, str]
@@ -48,7 +48,9 @@ class RemotePilot:
     """
 
     def __init__(self, node: Node) -> None:
-        self._clients = {name: node.create_client(kind, name) for name, kind in SERVICES.items()}
+        self._clients = {
+            name: node.create_client(kind, name, qos_profile=SERVICE_QOS) for name, kind in SERVICES.items()
+        }
         self._output = node.create_publisher(Controls, "controls", COMMAND_QOS)
         self._held: Controls | None = None
         node.create_timer(COMMAND_PERIOD, self._hold)

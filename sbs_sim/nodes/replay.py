@@ -34,7 +34,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
 from sbs_sim.nodes.executables import INTERRUPTED
-from sbs_sim.nodes.host import DISCOVERY, EVENT_QOS, STATE_QOS, Component, own_arguments, run
+from sbs_sim.nodes.host import DISCOVERY, EVENT_QOS, SERVICE_QOS, STATE_QOS, Component, own_arguments, run
 from sbs_sim.nodes.recorder import Recorder, definition_file
 from sbs_sim.progress import progress_bar
 from sbs_sim.recording import Log, message_definition, read, recover
@@ -110,7 +110,7 @@ class Replay(Component):
         self._paused = self._stopping = False
         self._ended, self._progress = ended, progress
         self._next_look, self._lookout_end = 0.0, math.inf
-        self.create_service(SetBool, "pause", self._on_pause)
+        self.create_service(SetBool, "pause", self._on_pause, qos_profile=SERVICE_QOS)
         self._thread = threading.Thread(target=self._play, name="replay", daemon=True)
         self._thread.start()
 

@@ -24,7 +24,7 @@ from sbs_sim.nodes.analysis import Analysis
 from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
-from sbs_sim.nodes.host import COMMAND_QOS, Component, Parameter, declare, run
+from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS, Component, Parameter, declare, run
 from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.nodes.recording import Recording
 from sbs_sim.simulation import Simulation, trimmed_state
@@ -79,10 +79,10 @@ class Simulator(Component):
         self._arrivals = Arrivals(self, SwashplateArray, "swashplate", COMMAND_QOS, self.log)
         self._outputs = Outputs(self, self.loop, self._arrivals, self.log)
         self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
-        self.create_service(SetBool, "pause", self._on_pause)
-        self.create_service(Step, "step", self._on_step)
-        self.create_service(Reset, "reset", self._on_reset)
-        self.create_service(SetWind, "set_wind", self._on_set_wind)
+        self.create_service(SetBool, "pause", self._on_pause, qos_profile=SERVICE_QOS)
+        self.create_service(Step, "step", self._on_step, qos_profile=SERVICE_QOS)
+        self.create_service(Reset, "reset", self._on_reset, qos_profile=SERVICE_QOS)
+        self.create_service(SetWind, "set_wind", self._on_set_wind, qos_profile=SERVICE_QOS)
         self.add_on_set_parameters_callback(self._on_parameters)
 
     def _make_log(self, simulation: Simulation, values: dict[str, Any]) -> Recording | None:

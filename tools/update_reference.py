@@ -245,9 +245,11 @@ def topics() -> str:
 
 SERVICES = """
 What is wrong with a request is answered with `success` false and a `message` that names field, value and allowed range,
-and changes nothing. The defaults of a request are those of the interface: what is left out has them. A thousand requests
-wait for their turn; a client among many needs a history as long, or [loses answers](../robustness.md#services-and-the-action)
-while it is busy. `replay` serves `pause` too.
+and changes nothing. The defaults of a request are those of the interface: what is left out has them. `replay` serves
+`pause` too.
+
+A thousand requests wait for their turn. A client among many needs as long a history, or loses answers while it is busy:
+[why](../robustness.md#services-and-the-action).
 """
 LABELS = {"srv": ("Request", "Answer"), "action": ("Goal", "Result", "Feedback")}
 

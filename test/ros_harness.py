@@ -33,7 +33,7 @@ LAST_DOMAIN = 101  # the ports of later ones are those that Linux gives to anybo
 HELD_DOMAINS = 25
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 keep_to_this_machine()
-PATIENCE = 30.0  # s of wall time; generous, for machines that are busy
+PATIENCE = 60.0  # s of wall time; generous, for machines that are busy; DDS alone takes 20 to miss a killed process
 
 
 def _domains() -> Iterator[int]:

@@ -579,7 +579,7 @@ def test_an_interruption_during_a_long_service_does_not_wait_for_it(own_world):
     client.spin(0.5)
     begin = time.monotonic()
     assert process.interrupt() == 0
-    assert time.monotonic() - begin < 10.0
+    assert time.monotonic() - begin < 20.0
     assert "Traceback" not in process.output
 
 

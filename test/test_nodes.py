@@ -323,15 +323,15 @@ def test_the_mixer_clips_says_so_once_and_follows_the_paper(flight, client):
     array = client.next("diagnostics", lambda m: (s := status_of(m, "control_mixer")) and s.level)
     assert "collective at its limit of 20 deg" in status_of(array, "control_mixer").message
     assert flight.simulator.output.count("clipped: collective at its limit of 20 deg") == 1
-    # section 2.1.1: B1s(1) = B1s - dB1s, B1s(2) = B1s + dB1s; the actuators need a moment to get there
+    # section 2.1.1: B1s(1) = B1s - dB1s, B1s(2) = B1s + dB1s; it takes a moment, for the collective the longest
     moved = client.publish_until(
         "controls",
         controls_message([1.0, 0.0, 0.02, 0.01]),
         "swashplate",
-        lambda m: m.rotors[1].longitudinal_cyclic == pytest.approx(0.03),
+        lambda m: m.rotors[0].collective == pytest.approx(math.radians(20.0)),
     )
     assert moved.rotors[0].longitudinal_cyclic == pytest.approx(0.01)
-    assert moved.rotors[0].collective == pytest.approx(math.radians(20.0))
+    assert moved.rotors[1].longitudinal_cyclic == pytest.approx(0.03)
 
 
 def test_a_burst_of_requests_is_answered_to_the_last(flight, client):

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 from helpers import build
+from scipy.linalg import expm
 
 from sbs_sim import linearize, trim
-from sbs_sim.analysis.floquet import common_period, floquet
+from sbs_sim.analysis.floquet import Floquet, _beside, _transition, common_period, floquet
 from sbs_sim.errors import LinearizationError
 
 
@@ -62,6 +63,42 @@ def test_period_is_common_to_all_rotors():
     assert period == pytest.approx(60.0 / 1600.0 / 3 * 2)
     with pytest.raises(LinearizationError, match="no common period"):
         common_period(build(rotors=[{}, {"speed_rpm": 2400.0 * math.sqrt(0.5)}]))
+
+
+def test_periods_are_searched_up_to_sixty_passages():
+    _, passages = common_period(build(rotors=[{"speed_rpm": 2440.0}, {"speed_rpm": 2400.0}]))
+    assert passages == [61, 60]
+    with pytest.raises(LinearizationError, match="of up to 60 of them"):
+        common_period(build(rotors=[{"speed_rpm": 2480.0}, {"speed_rpm": 2440.0}]))
+
+
+def test_transition_is_of_fourth_order():
+    """A constant system seen in axes that turn is periodic, and its transition over a turn is known."""
+    rate, constant = 3.0, np.array([[-0.5, 2.0], [0.3, 0.2]])
+    turning = rate * np.array([[0.0, -1.0], [1.0, 0.0]])
+    period = 2.0 * math.pi / rate
+    exact, errors = expm((constant - turning) * period), []
+    for count in (48, 96, 192):
+        axes = [expm(turning * period * i / count) for i in range(count)]
+        found = _transition(np.array([to @ constant @ to.T for to in axes]), period)
+        errors.append(np.abs(found - exact).max())
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 16.0, rtol=0.1)
+    assert errors[-1] < 1e-5
+
+
+def test_exponents_are_on_the_branch_of_their_poles():
+    """Poles up to some turns per period, given in another order than their multipliers."""
+    period = 0.7
+    poles = np.array([-0.5 + 0j, -1.0 - 3j, -1.0 + 3j, -0.2 - 30j, -0.2 + 30j, 0.1 - 7.5j, 0.1 + 7.5j])
+    multipliers, exponents = _beside(poles, np.exp(poles * period)[[3, 1, 6, 0, 2, 5, 4]], period)
+    np.testing.assert_allclose(exponents, poles, atol=1e-12)
+    np.testing.assert_allclose(multipliers, np.exp(poles * period), atol=1e-12)
+
+
+def test_differences_are_shares_of_the_poles():
+    poles = np.array([0.0, -2.0, 4.0j])
+    found = Floquet(1.0, np.eye(3), np.exp(poles), poles * [1.0, 1.01, 1.0 - 0.02j], poles)
+    np.testing.assert_allclose(found.difference, [0.0, 0.01, 0.02], rtol=1e-9)
 
 
 @pytest.mark.parametrize("count", [-2, 0, 7, 13, 1002])

@@ -247,6 +247,27 @@ def test_heavily_damped_flap_keeps_its_name():
     assert sum("flap" in name for name in found) == 2
 
 
+def test_a_regressing_flap_that_does_not_oscillate_is_told_from_the_advancing_one():
+    """Rotating at one per revolution it stands still in fixed axes: two real poles, told apart by unequal springs."""
+    omega, damping, unequal = 1.0, 0.5, 0.1
+    stiffness = 1.0 + damping**2 / 4.0  # so that the damped frequency is one per revolution
+    a = np.zeros((4, 4))
+    a[0, 2] = a[1, 3] = 1.0
+    a[2] = [omega**2 - stiffness + unequal, -damping * omega, -damping, -2 * omega]
+    a[3] = [damping * omega, omega**2 - stiffness - unequal, 2 * omega, -damping]
+    assert sum(abs(np.linalg.eigvals(a).imag) < 1e-9) == 2
+    found = modes(a, ("a1(1)", "b1(1)", "da1(1)", "db1(1)"))
+    assert sorted(mode.name for mode in found) == ["advancing flap", "regressing flap (+)", "regressing flap (-)"]
+
+
+def test_more_than_two_modes_of_a_name_are_numbered_slowest_first():
+    """The inflows of three rotors that all act on each other belong to none of them."""
+    coupled = np.array([[0.0, 0.5, 0.2], [0.5, 0.0, 0.4], [0.2, 0.4, 0.0]]) - 2.0 * np.eye(3)
+    found = modes(coupled, [f"lambda0({rotor})" for rotor in (1, 2, 3)])
+    assert [mode.name for mode in found] == [f"uniform inflow {number}" for number in (1, 2, 3)]
+    np.testing.assert_allclose([mode.pole.real for mode in found], np.sort(np.linalg.eigvalsh(coupled))[::-1])
+
+
 def test_first_matrix_has_the_names_of_table_5(sbs_paper):
     point = trim(sbs_paper, cyclic_inflow=False)
     model = linearize(sbs_paper, point=point, method="paper")
@@ -262,6 +283,19 @@ def test_first_matrix_has_the_names_of_table_5(sbs_paper):
         for name in ("collective flap", "collective lag"):
             assert abs(found[f"{name}, rotor {j}"].pole) < 1e-6
     assert sum(1 + mode.is_oscillatory for mode in found.values()) == 24 - 4 + 4
+
+
+def test_first_matrix_of_rotors_of_two_speeds_has_the_names_of_each():
+    aircraft = build("sbs_paper", rotors=[{}, {"speed_rpm": 2000.0}])
+    model = linearize(aircraft, cyclic_inflow=False, method="paper")
+    rotor = [name for name in model.state_names if part_of(name).family in ("flap", "lag")]
+    found = {mode.name: mode for mode in first_matrix_modes(model.blocks["A_R_first"], rotor)}
+    for j, own in enumerate(aircraft.rotors, 1):
+        for name in ("non-uniform disc tilt", "non-uniform lag"):
+            mode = found[f"{name}, rotor {j}"]
+            assert mode.pole.imag == pytest.approx(own.speed, rel=1e-9)
+            others = [i for i, state in enumerate(rotor) if part_of(state).rotor != j - 1]
+            np.testing.assert_array_equal(mode.participation[others], 0.0)
 
 
 def test_first_matrix_names_do_not_depend_on_order_and_units(sbs_paper):
@@ -295,6 +329,9 @@ def test_figures_of_a_mode():
     growing = dataclasses.replace(heave, pole=0.5 + 0j)
     assert growing.time_to_double == pytest.approx(math.log(2) / 0.5)
     assert growing.time_to_half == math.inf
+    still = dataclasses.replace(heave, pole=0j)
+    assert still.time_to_half == still.time_to_double == still.period == math.inf
+    assert still.damping == 0.0
     np.testing.assert_allclose(a @ phugoid.vector, phugoid.pole * phugoid.vector, atol=1e-9)
     assert np.abs(phugoid.vector).max() == pytest.approx(1.0)
     assert phugoid.participation.sum() == pytest.approx(1.0)

@@ -6,13 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.signal import welch
 
 from sbs_sim import Simulation
 from sbs_sim.errors import SimulationError
 from sbs_sim.model.frames import rotation_matrix
 from sbs_sim.model.state import VELOCITY
-from sbs_sim.model.wind import TURBULENCE_FROM, TURBULENCE_TO, WIND_SIZE, Wind, WindField, wind_at
+from sbs_sim.model.wind import TURBULENCE_FROM, TURBULENCE_TO, WIND_SIZE, Wind, WindField, _noise_of_step, wind_at
 from sbs_sim.simulation import simulate, trimmed_state
 
 
@@ -53,6 +54,13 @@ def test_the_gust_has_the_shape_the_peak_and_the_integral_of_one_minus_cosine():
     # it begins and ends without a jump and without a kink
     assert np.abs(np.diff(speeds[:, 0])).max() == pytest.approx(8 / 2 * 2 * math.pi / 3 * 0.001, rel=1e-3)
     assert np.abs(np.diff(speeds[:, 0], 2)).max() <= 8 / 2 * (2 * math.pi / 3 * 0.001) ** 2 * 1.001
+
+
+def test_a_gust_without_a_delay_begins_with_the_flight():
+    array = WindField(Wind(gust=(8.0, 0.0, 0.0), gust_duration=2.0), 10.0, 0.01).next_tick()
+    np.testing.assert_allclose(
+        [air_at(array, 10.0 + t)[0] for t in (0.0, 0.5, 1.0, 2.0)], [0.0, 4.0, 8.0, 0.0], atol=1e-12
+    )
 
 
 def test_no_gust_without_duration():
@@ -152,6 +160,17 @@ def test_the_variance_does_not_depend_on_the_tick(ratio):
     lag = 3 * ratio
     found = np.mean(np.array(first) * later, axis=0) / SIGMA**2
     assert (np.abs(found - correlations(lag)) < 5 * spread).all()
+
+
+@pytest.mark.parametrize("ratio", [0.01, 0.1, 1.0, 10.0])
+def test_noise_of_a_step_keeps_the_stationary_covariance(ratio):
+    """Its covariance Q solves P = F P F^T + Q, with F the transition of z1' = -z1, z2' = z1 - z2 over the step."""
+    n11, n21, n22 = _noise_of_step(ratio)
+    factor = np.array([[n11, 0.0], [n21, n22]])
+    stationary = np.array([[0.5, 0.25], [0.25, 0.25]])
+    transition = expm(ratio * np.array([[-1.0, 0.0], [1.0, -1.0]]))
+    expected = stationary - transition @ stationary @ transition.T
+    np.testing.assert_allclose(factor @ factor.T, expected, rtol=1e-9, atol=1e-15)
 
 
 @pytest.mark.parametrize(("length", "airspeed", "tick"), [(1e4, 0.1, 1e-4), (1e4, 0.1, 0.01), (1e3, 10, 1e-4)])

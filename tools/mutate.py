@@ -59,7 +59,7 @@ MODULES: dict[str, tuple[str, ...]] = {
     "analysis/trim_problem": ("test_trim.py", "test_two_loop.py"),
     "analysis/modes": ("test_modes.py",),
     "analysis/trim": ("test_trim.py", "test_two_loop.py"),
-    "analysis/newton": ("test_trim.py",),
+    "analysis/newton": ("test_newton.py",),
     "analysis/floquet": ("test_floquet.py",),
 }
 ARITHMETIC, COMPARISONS = ("Add", "Sub", "Mul", "Div"), ("Lt", "LtE", "Gt", "GtE", "Eq", "NotEq")

@@ -8,7 +8,9 @@ from test_conservation import ONE_SECOND, PSI, STEP, differences, disturbed
 from sbs_sim import Simulation, simulate
 from sbs_sim.errors import SimulationError
 from sbs_sim.model import state as S
-from sbs_sim.model.integrate import PARTITIONED, RK4, TSIT5
+from sbs_sim.model import wind as W
+from sbs_sim.model.frames import euler_to_quaternion
+from sbs_sim.model.integrate import PARTITIONED, RK4, TSIT5, TSITOURAS, advance
 from sbs_sim.simulation import trimmed_state
 
 QUARTER = 0.25  # s, ten revolutions
@@ -59,6 +61,161 @@ def test_long_steps_of_fifth_order_are_as_good_as_short_ones_of_fourth(sbs, hove
         for steps, method in ((300, TSIT5), (450, RK4))
     )
     assert fifth < 0.2 * fourth
+
+
+# -- the steps as in a textbook ------------------------------------------------------------------------------
+
+
+class Disturbed:
+    """Anything but a trim, in air that changes within the tick: steps that can be followed by hand."""
+
+    psi0, first_step, steps, h = np.array([0.4, 5.1]), 7, 2, 4e-4
+    swash = np.array([[0.1, 0.02, -0.03], [0.12, -0.01, 0.04]])
+
+    def __init__(self):
+        self.model = Model(build(options={"elements": 3}))
+        rng = np.random.default_rng(6)
+        self.x = self.model.state((4.0, -1.0, 2.0), (0.3, -0.2, 0.5), 0.04)
+        self.x[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(0.5, 0.2, -0.3)
+        self.x[S.BODY_SIZE :] += 0.02 * rng.standard_normal(self.x.size - S.BODY_SIZE)
+        self.air = np.zeros(W.WIND_SIZE)
+        self.air[W.STEADY : W.STEADY + 3] = 1.0, 2.0, -0.5
+        self.air[W.GUST : W.GUST + 3], self.air[W.GUST_START], self.air[W.GUST_DURATION] = 3.0, 0.002, 0.004
+        self.air[W.TURBULENCE_FROM : W.TURBULENCE_FROM + 3] = 0.5, -0.4, 0.3
+        self.air[W.TURBULENCE_TO : W.TURBULENCE_TO + 3] = -0.2, 0.6, 0.1
+
+    def slope(self, x, ahead):
+        """Derivative so many steps after the first of the tick."""
+        psi = self.psi0 + self.model.speeds * self.h * (self.first_step + ahead)
+        air = np.empty(3)
+        W.wind_at(self.air, self.h * (self.first_step + ahead), ahead / self.steps, air)
+        return self.model.derivative(x, self.swash, psi, air)
+
+    def flown(self, method, bounds=None):
+        """Steps made, the culprit, and the state after a tick of `advance`."""
+        x = self.x.copy()
+        bounds = np.full(x.size + 1, np.inf) if bounds is None else bounds
+        numbers = (self.first_step, self.steps, self.h)
+        done = advance(self.model.params, x, self.swash, self.psi0, *numbers, self.air, method, bounds, self.model.work)
+        return *done, x
+
+
+def unit_attitude(x):
+    x[S.ATTITUDE : S.VELOCITY] /= np.linalg.norm(x[S.ATTITUDE : S.VELOCITY])
+    return x
+
+
+def test_classical_steps_are_kuttas():
+    flight = Disturbed()
+    x, h = flight.x.copy(), flight.h
+    for i in range(flight.steps):
+        k1 = flight.slope(x, i)
+        k2 = flight.slope(x + h / 2 * k1, i + 0.5)
+        k3 = flight.slope(x + h / 2 * k2, i + 0.5)
+        k4 = flight.slope(x + h * k3, i + 1)
+        x = unit_attitude(x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+    done, culprit, found = flight.flown(RK4)
+    assert (done, culprit) == (flight.steps, -1)
+    np.testing.assert_allclose(found, x, rtol=1e-11, atol=1e-13)
+
+
+def test_partitioned_steps_are_those_of_figure_3():
+    """Rotor accelerations are of the first stage, but for what the turning of the coordinates adds.
+
+    With three blades, a1'' + i b1'' has 2 i Omega (a1' + i b1') + Omega^2 (a1 + i b1).
+    """
+    flight = Disturbed()
+    layout, x, h = flight.model.layout, flight.x.copy(), flight.h
+
+    def turning(x):
+        added = np.zeros(x.size)
+        for j, omega in enumerate(flight.model.speeds):
+            pairs = ((layout.flap(j), layout.flap_rate(j)), (layout.lag(j), layout.lag_rate(j)))
+            for angles, rates in pairs:
+                disc, rate = x[angles][1] + 1j * x[angles][2], x[rates][1] + 1j * x[rates][2]
+                sum_ = 2j * omega * rate + omega**2 * disc
+                added[rates] = 0.0, sum_.real, sum_.imag
+        return added
+
+    accelerations = np.zeros(x.size, dtype=bool)
+    for j in range(2):
+        accelerations[layout.flap_rate(j)] = accelerations[layout.lag_rate(j)] = True
+
+    for i in range(flight.steps):
+        first = flight.slope(x, i)
+
+        def slope(stage, ahead, x=x, first=first):
+            frozen = first + turning(stage) - turning(x)
+            return np.where(accelerations, frozen, flight.slope(stage, ahead))
+
+        k2 = slope(x + h / 2 * first, i + 0.5)
+        k3 = slope(x + h / 2 * k2, i + 0.5)
+        k4 = slope(x + h * k3, i + 1)
+        x = unit_attitude(x + h / 6 * (first + 2 * k2 + 2 * k3 + k4))
+    np.testing.assert_allclose(flight.flown(PARTITIONED)[2], x, rtol=1e-11, atol=1e-13)
+
+
+def test_tsitouras_coefficients_meet_the_conditions_of_order_five():
+    """Butcher's; E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, section II.2.
+
+    The printed coefficients, up to 11.7, have 15 digits.
+    """
+    a, b = TSITOURAS[:-1], TSITOURAS[-1]
+    c, one = a.sum(axis=1), np.ones(len(b))
+    trees = {
+        1: [one],
+        2: [c],
+        6: [a @ c],
+        24: [a @ a @ c],
+        8: [c * (a @ c)],
+        12: [a @ c**2],
+        3: [c**2],
+        4: [c**3],
+        5: [c**4],
+        10: [c**2 * (a @ c)],
+        15: [c * (a @ c**2)],
+        30: [c * (a @ a @ c)],
+        20: [(a @ c) ** 2, a @ c**3],
+        40: [a @ (c * (a @ c))],
+        60: [a @ a @ c**2],
+        120: [a @ a @ a @ c],
+    }
+    assert sum(map(len, trees.values())) == 17
+    for density, weights in trees.items():
+        for weight in weights:
+            assert b @ weight == pytest.approx(1.0 / density, abs=1e-12)
+    np.testing.assert_array_equal(np.triu(a), 0.0)
+
+
+def test_tsitouras_steps_are_those_of_the_tableau():
+    flight = Disturbed()
+    x, c = flight.x.copy(), TSITOURAS[:-1].sum(axis=1)
+    for i in range(flight.steps):
+        slopes = []
+        for row, ahead in zip(TSITOURAS[:-1], c, strict=True):
+            stage = x + flight.h * sum((a * k for a, k in zip(row, slopes, strict=False)), np.zeros(x.size))
+            slopes.append(flight.slope(stage, i + ahead))
+        x = unit_attitude(x + flight.h * TSITOURAS[-1] @ np.array(slopes))
+    np.testing.assert_allclose(flight.flown(TSIT5)[2], x, rtol=1e-11, atol=1e-13)
+
+
+def test_a_tick_ends_before_what_is_implausible():
+    """The bound of the climb is passed in the second step: the state is that after the first."""
+    flight = Disturbed()
+    after = [flight.x]
+    for steps in (1, 2):
+        cut = Disturbed()
+        cut.air[W.TURBULENCE_TO : W.TURBULENCE_TO + 3] = cut.air[W.TURBULENCE_FROM : W.TURBULENCE_FROM + 3]
+        cut.steps = steps
+        after.append(cut.flown(RK4)[2])
+    flight.air[W.TURBULENCE_TO : W.TURBULENCE_TO + 3] = flight.air[W.TURBULENCE_FROM : W.TURBULENCE_FROM + 3]
+    down = S.POSITION + 2
+    bounds = np.full(flight.x.size + 1, np.inf)
+    bounds[down] = 0.5 * abs(after[1][down] + after[2][down])
+    assert abs(after[1][down]) < bounds[down] < abs(after[2][down])
+    done, culprit, x = flight.flown(RK4, bounds)
+    assert (done, culprit) == (1, down)
+    np.testing.assert_array_equal(x, after[1])
 
 
 def test_five_degrees_are_enough_for_the_real_airfoil(sbs, hover):

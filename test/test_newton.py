@@ -95,7 +95,7 @@ def test_a_jacobian_that_serves_badly_is_taken_anew():
 
 
 def test_a_jacobian_that_has_served_and_does_no_longer_is_taken_anew():
-    """A first step along the slope of 1 leads to 5 % of the residual, where the slope is 2.5 and another is too long."""
+    """A first step along the slope of 1 leaves 5 % of the residual, where the slope is 2.5 and it leads too far."""
 
     def broken_line(values):
         return np.interp(values, [-1.0, 0.0, 0.005, 0.09, 1.0], [-2.505, -0.005, 0.0075, 0.09, 1.0])

@@ -8,10 +8,11 @@ import scipy.linalg
 from helpers import Model, aircraft_data, build, mirrored_data
 
 from sbs_sim import Aircraft, linearize, trim
-from sbs_sim.analysis.linearize import kinematics, settle
+from sbs_sim.analysis.linearize import difference_steps, jacobians, kinematics, settle, used_states
 from sbs_sim.errors import LinearizationError, TrimError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
+from sbs_sim.model.frames import rotation_matrix
 from sbs_sim.simulation import trimmed_state
 
 FIDELITIES = [(False, False), (True, False), (True, True)]
@@ -309,6 +310,30 @@ def test_outputs_follow_from_the_states(sbs, cruise):
     assert cruise.c[rows["power(1)"], 1] == pytest.approx(power, rel=1e-6)
     assert cruise.c[rows["specific_force_z"], 1] == pytest.approx((up[0] - down[0])[9] / (2 * step), rel=1e-6)
     assert len(cruise.output_units) == len(cruise.output_names) == len(cruise.c) == len(cruise.d)
+
+
+def test_climb_rate_in_a_turn_is_that_of_the_velocity_turned_to_the_earth(sbs):
+    model = linearize(sbs, airspeed=10.0, climb_rate=1.0, turn_rate=0.3)
+    row = model.c[model.output_names.index("climb_rate")]
+
+    def climb_rate(linear):
+        x = sbs.layout.from_linear(linear)
+        return -(rotation_matrix(x[S.ATTITUDE : S.VELOCITY]) @ x[S.VELOCITY : S.RATES])[2]
+
+    state, step = model.trim.state, 1e-5
+    assert climb_rate(state) == pytest.approx(1.0)
+    for i in range(len(state)):
+        moved = step * np.eye(len(state))[i]
+        slope = (climb_rate(state + moved) - climb_rate(state - moved)) / (2 * step)
+        assert row[i] == pytest.approx(slope, abs=1e-8), model.state_names[i]
+
+
+def test_what_the_fidelity_leaves_out_has_empty_columns(sbs):
+    point = trim(sbs, lead_lag=False, cyclic_inflow=False)
+    found = jacobians(sbs, point, np.zeros((1, 2)), difference_steps(sbs))[0]
+    out = np.delete(np.arange(len(point.state)), used_states(point))
+    assert {point.state_names[i] for i in out} >= {"xi0(1)", "dxic(2)", "lambdas(1)"}
+    np.testing.assert_array_equal(found[:, out], 0.0)
 
 
 def test_quasi_static_model_is_the_settled_rotor(sbs, hover, hover_model):

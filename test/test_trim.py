@@ -8,6 +8,7 @@ from helpers import Model, aircraft_data, build, linear_airfoil, mirrored_data
 
 from sbs_sim import simulate, trim
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
 from sbs_sim.errors import TrimError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
@@ -41,6 +42,20 @@ def disc_area(rotor):
 
 
 # -- equilibrium ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fidelity", [(False, False), (True, True)])
+@pytest.mark.parametrize("name", ["hover", "oblique", "left turn in a climb"])
+def test_jacobian_of_the_equations_is_their_difference(sbs, name, fidelity):
+    """All unknowns, away from the solution; as many azimuths as the Jacobian takes at most."""
+    problem, condition = TrimProblem(sbs, *fidelity, 4), TrimCondition(**CONDITIONS[name])
+    unknowns = problem.first_guess(0.0) + 0.02 * np.random.default_rng(1).standard_normal(len(problem.equations))
+    found, step = problem.jacobian(condition, unknowns), 1e-6
+    for i in range(len(unknowns)):
+        moved = step * np.eye(len(unknowns))[i]
+        sides = [problem.residual(condition, unknowns + sign * moved) for sign in (1, -1)]
+        expected = (sides[0] - sides[1]) / (2 * step)
+        np.testing.assert_allclose(found[:, i], expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max(), err_msg=str(i))
 
 
 @pytest.mark.parametrize("name", CONDITIONS)

@@ -537,10 +537,9 @@ def _tell_if_broken(log: Log) -> None:
 
 def _verify(path: Path) -> int:
     """0 if every state came again as it should."""
-    log = read(path)
-    _tell_if_broken(log)
+    flight = _flight(path)
     with progress_bar("state") as progress:
-        found = verify(flight_of(log), progress)
+        found = verify(flight, progress)
     for name, (recorded, here) in found.other_versions.items():
         print(f"other {name}: {recorded or 'unknown'} recorded, {here} here")
     if found.identical:
@@ -558,6 +557,13 @@ def _verify(path: Path) -> int:
         print(f"with other versions {found.states} states are compared by a tolerance: {within} {TOLERANCE:g}")
         return 0 if found.within_tolerance else 1
     return 1
+
+
+def _flight(path: Path) -> Flight:
+    """Flight of a log; the log itself, several times as large, is not kept while it is flown again."""
+    log = read(path)
+    _tell_if_broken(log)
+    return flight_of(log)
 
 
 def _fly_with(options: argparse.Namespace) -> int:

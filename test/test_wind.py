@@ -56,7 +56,7 @@ def test_the_gust_has_the_shape_the_peak_and_the_integral_of_one_minus_cosine():
     assert np.abs(np.diff(speeds[:, 0], 2)).max() <= 8 / 2 * (2 * math.pi / 3 * 0.001) ** 2 * 1.001
 
 
-def test_a_gust_without_a_delay_begins_with_the_flight():
+def test_a_gust_without_a_delay_begins_at_once():
     array = WindField(Wind(gust=(8.0, 0.0, 0.0), gust_duration=2.0), 10.0, 0.01).next_tick()
     np.testing.assert_allclose(
         [air_at(array, 10.0 + t)[0] for t in (0.0, 0.5, 1.0, 2.0)], [0.0, 4.0, 8.0, 0.0], atol=1e-12

@@ -73,7 +73,7 @@ def environment(domain: int, folder: Path | None = None) -> dict[str, str]:
 
 
 class Process:
-    """A running executable with its output in a file."""
+    """A running executable with its output in a file, in a folder that also takes what it writes under a plain name."""
 
     def __init__(
         self,
@@ -92,7 +92,7 @@ class Process:
             command += ["-r", remap]
         with self.log.open("w") as out:
             self._popen = subprocess.Popen(
-                command, stdout=out, stderr=subprocess.STDOUT, env=environment(domain, folder)
+                command, stdout=out, stderr=subprocess.STDOUT, env=environment(domain, folder), cwd=folder
             )
         self.pid = self._popen.pid
 

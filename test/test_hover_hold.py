@@ -9,7 +9,7 @@ from helpers import aircraft_data, mirrored_data
 from scipy.linalg import expm
 
 from sbs_sim import Aircraft, linearize
-from sbs_sim.errors import PilotError
+from sbs_sim.errors import PilotError, SimulationError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.wind import Wind
@@ -313,6 +313,16 @@ def test_what_is_not_finite_is_refused_and_changes_nothing(found):
     with pytest.raises(PilotError, match=r"allowed are 3 numbers up to 1e.09 m"):
         pilot.hold((0.0, math.inf, 0.0), 0.0)
     np.testing.assert_array_equal(pilot.controls(0.0, body), before)
+
+
+def test_the_first_controls_of_a_pilot_are_treated_like_all_others(sbs, model):
+    """Beyond the range of the collective they are clipped, beyond reason refused by their name."""
+    highest = sbs.control_ranges["collective"][1]
+    flights = [fly(sbs, model.trim, lambda t, x, c=c: [c, 0.0, 0.0, 0.0], 0.05) for c in (highest, highest + 0.3)]
+    np.testing.assert_array_equal(flights[1]["state"], flights[0]["state"])
+    for value in (math.nan, 2.0):
+        with pytest.raises(SimulationError, match=f"^collective = {value}: allowed are"):
+            fly(sbs, model.trim, lambda t, x, c=value: [c, 0.0, 0.0, 0.0], 0.05)
 
 
 def test_a_delay_out_of_range_is_refused(sbs, model, found):

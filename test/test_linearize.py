@@ -348,6 +348,24 @@ def test_quasi_static_model_is_the_settled_rotor(sbs, hover, hover_model):
     assert hover_model.derivatives()["M_q"] == pytest.approx(expected, rel=1e-3)
 
 
+def test_quasi_static_outputs_are_those_of_the_settled_states(cruise):
+    """For any body states and controls: the others follow from zero rates, and rates and outputs from all of them."""
+    kept = ("q", "theta", "w", "phi", "r")
+    reduced = cruise.quasi_static(kept)
+    rng, names = np.random.default_rng(2), list(cruise.state_names)
+    slow = [names.index(name) for name in kept]
+    fast = [i for i in range(len(names)) if i not in slow]
+    x, u = np.zeros(len(names)), rng.standard_normal(4)
+    x[slow] = rng.standard_normal(len(kept))
+    x[fast] = -np.linalg.solve(cruise.a[np.ix_(fast, fast)], cruise.a[fast] @ x + cruise.b[fast] @ u)
+    rates, outputs = (cruise.a @ x + cruise.b @ u)[slow], cruise.c @ x + cruise.d @ u
+    found_rates, found_outputs = (m @ x[slow] + n @ u for m, n in ((reduced.a, reduced.b), (reduced.c, reduced.d)))
+    np.testing.assert_allclose(found_rates, rates, rtol=1e-9, atol=1e-9 * np.abs(rates).max())
+    np.testing.assert_allclose(found_outputs, outputs, rtol=1e-9, atol=1e-9 * np.abs(outputs).max())
+    assert reduced.state_names == kept
+    assert reduced.state_units == ("rad/s", "rad", "m/s", "rad", "rad/s")
+
+
 def test_derivatives_are_without_kinematics(sbs, cruise):
     found = cruise.derivatives()
     settled = cruise.quasi_static()

@@ -76,7 +76,8 @@ def fly(
     else:
         state = checks.array("start", start, PilotError)
     given = [_asked(pilot, 0.0, state)]
-    simulation = Simulation(aircraft, state, aircraft.mix(given[0]), wind=wind, **options)
+    mixer.set_target(given[0])
+    simulation = Simulation(aircraft, state, mixer.move(0.0), wind=wind, **options)
     snapshots = []
     for tick in range(round(duration / simulation.tick) + 1):
         if tick > 0:

@@ -140,6 +140,18 @@ def test_attitude_columns_are_gravity_and_kinematics(sbs, cruise):
         np.testing.assert_allclose(cruise.a[8:, column], 0.0, atol=1e-2)
 
 
+def test_steps_follow_from_the_kind_of_the_state(cruise):
+    """Flap and lag alike, their rates alike, all inflow alike, whatever rotor and harmonic."""
+    kinds = {}
+    for name, step in zip(cruise.state_names, cruise.steps, strict=False):
+        part = S.part_of(name)
+        if part.family != "body":
+            kinds.setdefault((part.family == "inflow", part.is_rate), set()).add(step)
+    assert len(kinds) == 3
+    assert all(len(steps) == 1 for steps in kinds.values())
+    assert kinds[False, False] != kinds[False, True]
+
+
 def test_steps_hardly_matter(sbs, cruise):
     """A third and three times the steps move no pole by more than 0.2 %."""
     for scale in (0.03, 0.3, 3.0):

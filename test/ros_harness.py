@@ -33,6 +33,7 @@ LAST_DOMAIN = 101  # the ports of later ones are those that Linux gives to anybo
 HELD_DOMAINS = 25
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 keep_to_this_machine()
+MEASURED = "COVERAGE_PROCESS_CONFIG" in os.environ  # tools/coverage_report.py
 PATIENCE = 60.0  # s of wall time; generous, for machines that are busy; DDS alone takes 20 to miss a killed process
 
 
@@ -350,6 +351,9 @@ def world(domain: int, folder: Path) -> Iterator[World]:
         yield made
     finally:
         for process in made.processes:
+            if MEASURED and process.running:  # what is killed cannot tell what it has executed
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.interrupt()
             process.kill()
         made.client.close()
 

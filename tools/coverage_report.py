@@ -58,7 +58,8 @@ def main() -> int:
     if not arguments.only_report:
         _coverage("erase")
         tests = [f"test/{Path(test).name}" for test in arguments.tests] or _files(arguments.nodes)
-        code = _tests(_plain_tests(), {"NUMBA_DISABLE_JIT": "1"})
+        for plain in _plain_tests():
+            code |= _tests(plain, {"NUMBA_DISABLE_JIT": "1"})
         for test in tests:  # one by one: who interrupts it, and asks for --only-report, keeps what was measured
             code |= _tests([test], {})
     _coverage("combine", "--keep", "--quiet")
@@ -73,10 +74,11 @@ def _files(nodes: bool) -> list[str]:
     return [f"test/{path.name}" for path in files if nodes or "ros_harness" not in path.read_text(encoding="utf-8")]
 
 
-def _plain_tests() -> list[str]:
-    """The tests of the model's modules in tools/mutate.py that are selected by nothing but their names."""
-    chosen = [tests for name, tests in mutate.MODULES.items() if name.startswith("model/") and "-k" not in tests]
-    return sorted({f"test/{test}" for tests in chosen for test in tests})
+def _plain_tests() -> list[list[str]]:
+    """The tests of the model's modules in tools/mutate.py: in one run those that are selected by nothing but names."""
+    chosen = [tests for name, tests in mutate.MODULES.items() if name.startswith("model/")]
+    selected = [[f"test/{test[0]}", *test[1:]] for test in chosen if "-k" in test]
+    return [sorted({f"test/{test}" for tests in chosen if "-k" not in tests for test in tests}), *selected]
 
 
 def _tests(tests: list[str], environment: dict[str, str]) -> int:

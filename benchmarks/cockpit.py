@@ -29,6 +29,7 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from sbs_msgs.msg import SimulationStatus
+from sbs_msgs.srv import Reset
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "test"))
@@ -37,6 +38,7 @@ import browser  # noqa: E402
 
 EXECUTABLES = ROOT / "install" / "sbs_sim" / "lib" / "sbs_sim"
 SETTLING = 3.0  # s before a measurement
+BLADES = "/ned/body/rotor0/blades"  # what every picture of a flight changes
 COUNT_FRAMES = """seconds => new Promise(done => {
     const begin = performance.now(); let frames = 0;
     const next = () => performance.now() - begin < 1e3 * seconds
@@ -66,6 +68,12 @@ class Watch(Node):
         super().__init__("watch")
         self.status: SimulationStatus | None = None
         self.create_subscription(SimulationStatus, "status", self._keep, 1)
+        self._reset = self.create_client(Reset, "reset")
+
+    def hover(self) -> None:
+        """Put the flight back to its trim, which it leaves within a minute or two."""
+        self._reset.wait_for_service()
+        rclpy.spin_until_future_complete(self, self._reset.call_async(Reset.Request()))
 
     def _keep(self, status: SimulationStatus) -> None:
         self.status = status
@@ -103,13 +111,13 @@ class Taker:
         self._thread.join()
 
     def _take(self) -> None:
-        """Count the windows in which the aircraft turns: one of each picture; viser may send a picture in several."""
+        """Count the windows in which the first rotor's blades turn: one of each picture, which may come in several."""
         for data in self._client:
             self._bytes += len(data)
             size = int.from_bytes(data[8:16], "little")
             told = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
             messages = msgspec.msgpack.decode(told)["messages"]
-            if any(one.get("name") == "/ned/body" and "wxyz" in one for one in messages):
+            if any(one.get("name") == BLADES and "batched_wxyzs" in one.get("updates", {}) for one in messages):
                 self._pictures.append(time.monotonic())
 
     def rate(self) -> float:
@@ -151,6 +159,7 @@ def main() -> None:
                 else:
                     with browser.page(f"http://127.0.0.1:{port}") as page:
                         row("with a cockpit and its page", watch, seconds, simulator, cockpit)
+                        watch.hover()
                         tell_frames(page)
     rclpy.shutdown()
 
@@ -176,6 +185,7 @@ def wait_for_page(port: int) -> None:
 
 def row(name: str, watch: Watch, seconds: float, simulator: psutil.Process, cockpit: psutil.Process | None) -> None:
     """Missed deadlines and processor time, over wall time, of some seconds."""
+    watch.hover()
     time.sleep(SETTLING)
     begin = watch.latest()
     processes = [one for one in (simulator, cockpit) if one is not None]

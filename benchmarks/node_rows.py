@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -69,14 +70,21 @@ def node_rows(seconds: float, memory_minutes: float) -> list[Row]:
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     watch = Watch()
+    with tempfile.TemporaryDirectory() as bags:
+        return _rows(watch, seconds, memory_minutes, {**os.environ, "SBS_SIM_BAGS": bags})
+
+
+def _rows(watch: Watch, seconds: float, memory_minutes: float, environment: dict[str, str]) -> list[Row]:
     begin = time.perf_counter()
-    process = subprocess.Popen([sys.executable, str(SIMULATOR)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen([sys.executable, str(SIMULATOR)], env=environment, **silent)
     try:
         while not watch.arrivals:
             time.sleep(0.002)
         rows: list[Row] = [("node: start to first state", watch.arrivals[0] - begin, "s", "with a warm cache")]
         time.sleep(3.0)
         rows += steady_rows(watch, psutil.Process(process.pid), seconds)
+        rows += log_rows(watch)
         rows += latency_rows(watch)
         if memory_minutes > 0:
             rows += memory_rows(psutil.Process(process.pid), memory_minutes, time.perf_counter() - begin)
@@ -110,6 +118,25 @@ def steady_rows(watch: Watch, process: psutil.Process, seconds: float) -> list[R
         ("node: period p50", float(np.percentile(gaps, 50)), "ms", "between states as received"),
         ("node: period p99", float(np.percentile(gaps, 99)), "ms", ""),
         ("node: period max", float(gaps.max()), "ms", ""),
+    ]
+
+
+def log_rows(watch: Watch, count: int = 20) -> list[Row]:
+    """What it costs to end a log and begin another in flight."""
+    from sbs_msgs.srv import Record
+
+    service = watch.node.create_client(Record, "record")
+    service.wait_for_service(10.0)
+    missed, begins = watch.status.missed_deadlines, []
+    for _ in range(count):
+        service.call(Record.Request(record=False))
+        start = time.perf_counter()
+        service.call(Record.Request(record=True))
+        begins.append(1e3 * (time.perf_counter() - start))
+        time.sleep(1.0)
+    return [
+        ("node: log begun in flight p50", float(np.median(begins)), "ms", f"longest {max(begins):.0f} ms"),
+        ("node: deadlines missed by it", watch.status.missed_deadlines - missed, "", f"{count} ends and begins"),
     ]
 
 

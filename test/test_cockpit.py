@@ -153,7 +153,7 @@ def test_the_condition_here_is_the_one_that_was_trimmed(condition, wind):
 def test_the_readout_says_what_the_state_says():
     snapshot, point = snapshot_of_flight(airspeed=10.0, heading=math.radians(30.0))
     text = readout(AIRCRAFT, snapshot, Status(True, 0.98, 3, "blade lost", "bags/x.mcap"), "sbs")
-    for part in ("25.00", "10.00", "30.0", "0.98 × real time", "3 deadlines missed", "blade lost", "recording x.mcap"):
+    for part in ("25.00", "10.00", "30.0", "0.98 × real time", "missed deadlines 3", "blade lost", "recording x.mcap"):
         assert part in text
     assert point.thrust.sum() == pytest.approx(20.62 * 9.80665, rel=0.05)
 

@@ -156,7 +156,7 @@ def _horizon(pitch: float, roll: float) -> str:
 def _state_line(status: Status, source: str) -> str:
     """What flies, how fast, where it is recorded, and what is wrong."""
     doing = f"playing, {status.real_time_factor:.2f} × real time" if status.playing else "paused"
-    late = f" · {status.missed_deadlines} deadlines missed" if status.missed_deadlines else ""
+    late = f" · missed deadlines {status.missed_deadlines}" if status.missed_deadlines else ""
     lines = [f"<b>{escape(source)}</b> {doing}{late}"]
     if status.log:
         lines.append(f'<span style="color:#5c6670">recording {escape(Path(status.log).name)}</span>')

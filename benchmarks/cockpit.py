@@ -72,8 +72,11 @@ class Watch(Node):
 
     def hover(self) -> None:
         """Put the flight back to its trim, which it leaves within a minute or two."""
-        self._reset.wait_for_service()
-        rclpy.spin_until_future_complete(self, self._reset.call_async(Reset.Request()))
+        self._reset.wait_for_service(10.0)
+        answer = self._reset.call_async(Reset.Request())
+        rclpy.spin_until_future_complete(self, answer, timeout_sec=10.0)
+        if not answer.done() or not answer.result().success:
+            raise RuntimeError("the flight is not put back to its trim")
 
     def _keep(self, status: SimulationStatus) -> None:
         self.status = status
@@ -99,7 +102,7 @@ class Taker:
         self._client = connect(f"ws://127.0.0.1:{port}", subprotocols=[subprotocol], proxy=None, max_size=None)
         self._client.send(msgspec.msgpack.encode(CAMERA))  # viser counts those who look from somewhere
         self._pictures: list[float] = []
-        self._begin, self._bytes = time.monotonic(), 0
+        self._bytes = 0
         self._thread = threading.Thread(target=self._take, daemon=True)
 
     def __enter__(self) -> "Taker":
@@ -113,7 +116,7 @@ class Taker:
     def _take(self) -> None:
         """Count the windows in which the first rotor's blades turn: one of each picture, which may come in several."""
         for data in self._client:
-            self._bytes += len(data)
+            self._bytes += len(data) if self._pictures else 0  # not the scene, which comes first
             size = int.from_bytes(data[8:16], "little")
             told = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
             messages = msgspec.msgpack.decode(told)["messages"]
@@ -128,7 +131,7 @@ class Taker:
 
     def traffic(self) -> float:
         """What came [kB/s]."""
-        return 1e-3 * self._bytes / (time.monotonic() - self._begin)
+        return 1e-3 * self._bytes / (time.monotonic() - self._pictures[0]) if self._pictures else math.nan
 
 
 def main() -> None:

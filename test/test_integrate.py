@@ -200,7 +200,7 @@ def test_tsitouras_steps_are_those_of_the_tableau():
 
 
 def test_a_tick_ends_before_what_is_implausible():
-    """The bound of the climb is passed in the second step: the state is that after the first."""
+    """The bound of the down coordinate is passed in the second step: the state is that after the first."""
     flight = Disturbed()
     after = [flight.x]
     for steps in (1, 2):

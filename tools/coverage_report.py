@@ -3,10 +3,11 @@
     ./run python tools/coverage_report.py [--nodes] [--lines] [TEST ...]
 
 TEST are files of the folder test; without any they are all but those that start ROS nodes, which `--nodes` adds. The
-executables that tests start are measured too, those that are killed excepted. Compiled kernels do not show: what numba
-compiled, Python does not execute. So the quick tests of tools/mutate.py run first with the kernels as plain
-Python (NUMBA_DISABLE_JIT), and both count together; a kernel that only a flight executes is then still named, although
-it is tested. `--lines` names the lines and the branches, as LINE->LINE, that were not executed.
+executables that tests start are measured too, but for those that a test kills; what it leaves running is interrupted.
+Compiled kernels do not show: what numba compiled, Python does not execute. So the quick tests of tools/mutate.py run
+first with the kernels as plain Python (NUMBA_DISABLE_JIT), and both count together; a kernel that only a flight
+executes is then still named, although it is tested. `--lines` names the lines and the branches, as LINE->LINE, that
+were not executed.
 
 A table by folder is printed, and kept with everything else in build/coverage. Exit code 1 if a test fails.
 """
@@ -27,7 +28,7 @@ FOLDER = ROOT / "build" / "coverage"
 SETTINGS = f"""
 [run]
 branch = True
-source = sbs_sim
+source_pkgs = sbs_sim
 parallel = True
 patch = subprocess
 sigterm = True

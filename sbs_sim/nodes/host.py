@@ -31,8 +31,6 @@ STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 ROS_REFUSALS = (rclpy_implementation.RCLError, NameValidationException, ParameterException)
 HEALTH_PERIOD = 1.0  # s of wall time between diagnostics
 COMPLAINT_PERIOD = 1.0  # s between complaints about bad input
-# How long a thread keeps the interpreter while another waits for it [s]; the 5 ms of Python are half a tick.
-TURN = 0.5e-3
 STOP_PERIOD = 0.2  # s, longest time that a thread takes to see the end
 DISCOVERY = 1.5  # s in which others that run already are found
 END_PATIENCE = 3.0  # s that a thread may take to end
@@ -264,7 +262,6 @@ def run(
         print(f"unknown argument {leftover[0]}: parameters are given as --ros-args -p name:=value", file=sys.stderr)
         return 2
     keep_to_this_machine()
-    sys.setswitchinterval(TURN)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:

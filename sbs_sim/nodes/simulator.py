@@ -30,6 +30,8 @@ from sbs_sim.nodes.recording import Recording
 from sbs_sim.simulation import Simulation, trimmed_state
 
 OFF = "off"
+# How long a thread keeps the interpreter while the flight waits for it [s]; the 5 ms of Python are half a tick.
+TURN = 0.5e-3
 COMPONENTS = ("simulator", "control_mixer", "analysis", "recorder")
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
@@ -211,6 +213,7 @@ def _nodes() -> list[Component]:
         nodes.append(Analysis(simulator.loop, simulator.log))
     if simulator.log is not None:
         nodes.append(simulator.log)
+    sys.setswitchinterval(TURN)
     simulator.loop.start()  # last: what is loaded meanwhile would make it miss deadlines
     return nodes
 

@@ -358,7 +358,7 @@ def test_what_cannot_be_recorded_is_refused_in_one_line_and_changes_nothing(tmp_
         assert answer.success
         assert Path(answer.path).parent == tmp_path
         assert refusal(record=True) == f"recording {answer.path} already: record = false ends it"
-        assert client.next("status").log == answer.path
+        assert client.next("status", lambda status: status.log).log == answer.path
     assert set(tmp_path.rglob("*.mcap")) == {tmp_path / "there.mcap", Path(answer.path)}
 
 

@@ -38,12 +38,22 @@ def data(report):
     return json.loads(json.dumps(report.to_dict(), allow_nan=False))
 
 
+def call(*arguments, cwd=None):
+    command = [str(ROOT / "run"), "reproduce", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False, cwd=cwd)
+
+
 @pytest.fixture(scope="module")
-def page(report, tmp_path_factory):
+def executed(tmp_path_factory):
+    """The executable with all that it can write, and the folder with that."""
+    folder = tmp_path_factory.mktemp("reproduce")
+    return call("--json", folder / "all.json", "--out", folder / "made" / "by it"), folder
+
+
+@pytest.fixture(scope="module")
+def page(executed):
     """Folder with figures and page."""
-    folder = tmp_path_factory.mktemp("page") / "made" / "by it"
-    save_page(report, folder)
-    return folder
+    return executed[1] / "made" / "by it"
 
 
 def leaves(data):
@@ -513,11 +523,16 @@ def test_page_holds_every_printed_text_and_remark(report, parsed, page):
     assert len(listed) == shown + len(report.remarks) + contents_of_the_page
 
 
-def test_the_same_report_gives_the_same_files(report):
+def test_the_same_report_gives_the_same_files_and_leaves_no_trace_in_matplotlib(report):
+    """No window, no style, no figure kept."""
+    import matplotlib
+
     drawing = next(drawing for drawing in drawings(report) if drawing.number == 4)  # has a hatch and clips
     first, second = drawing.encoded(), drawing.encoded()
     assert first == second
     assert b"<dc:date>" not in first["svg"]
+    assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
+    assert matplotlib.rcParams["svg.hashsalt"] is None
 
 
 def test_ids_of_an_svg_become_its_own():
@@ -531,14 +546,6 @@ def test_page_without_figures(report):
     assert Page(page_text(report, [])).open == []
 
 
-def test_figures_leave_no_trace_in_matplotlib(page):
-    """They were drawn by the fixture: no window, no style, no figure kept."""
-    import matplotlib
-
-    assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
-    assert matplotlib.rcParams["svg.hashsalt"] is None
-
-
 def test_a_folder_that_cannot_be_is_one_line(report, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ExportError, match="no folder can be made there"):
@@ -548,13 +555,8 @@ def test_a_folder_that_cannot_be_is_one_line(report, tmp_path):
 # -- the executable --------------------------------------------------------------------------------------------------
 
 
-def call(*arguments):
-    command = [str(ROOT / "run"), "reproduce", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
-
-
-def test_run_reproduce(tmp_path, data):
-    result = call("--json", tmp_path / "all.json", "--out", tmp_path / "page")
+def test_run_reproduce(executed, data):
+    result, folder = executed
     assert (result.returncode, result.stderr) == (0, "")
     lines = result.stdout.splitlines()
     assert max(map(len, lines)) <= 130
@@ -562,20 +564,13 @@ def test_run_reproduce(tmp_path, data):
         assert any(line.startswith(text) for line in lines), text
     row = next(line for line in lines if line.startswith("Short period"))
     assert row.split()[2:] == ["-7.26", "-4.007", "0.552*", "-7.297", "1.005", "[1]"]
-    assert json.loads((tmp_path / "all.json").read_text()) == data
-    assert (tmp_path / "page" / PAGE).is_file()
-    assert len(list((tmp_path / "page").glob("figure_*.svg"))) == len(FIGURES)
+    assert json.loads((folder / "all.json").read_text()) == data
+    told = f"written: {folder / 'made' / 'by it' / PAGE} and {2 * len(FIGURES)} figures"
+    assert lines[-1] == told
 
 
 def test_without_a_folder_nothing_is_drawn(tmp_path):
-    result = subprocess.run(
-        [str(ROOT / "run"), "reproduce", "--aircraft", "sbs_paper"],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-        cwd=tmp_path,
-    )
+    result = call("--aircraft", "sbs_paper", cwd=tmp_path)
     assert (result.returncode, result.stderr) == (0, "")
     assert "Not the paper's aircraft: sbs_paper." in result.stdout
     assert list(tmp_path.iterdir()) == []

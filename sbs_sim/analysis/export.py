@@ -4,9 +4,11 @@ Names and places are those of `TrimPoint` and `LinearModel`, SI units and radian
 """
 
 import csv
+import errno
 import io
 import json
 import math
+import os
 import re
 import shutil
 import uuid
@@ -112,6 +114,8 @@ def check_target(path: str | Path | None, suffixes: Collection[str] = ()) -> Non
         raise ExportError(f"{_named(path)}: allowed are names that end in {', '.join(suffixes)}")
     if _no_folder(path.parent):
         raise ExportError(f"{_named(path)}: cannot be written: there is no folder {_named(path.parent)}")
+    if os.path.isfile(path.parent):  # pathlib's raises for names that cannot be
+        raise ExportError(f"{_named(path)}: cannot be written: {os.strerror(errno.ENOTDIR)}")
 
 
 def _named(path: Path) -> str:

@@ -20,7 +20,6 @@ from sbs_sim.errors import SbsError, TrimError
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
-from sbs_sim.nodes.analysis import Analysis
 from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
@@ -210,6 +209,9 @@ def _nodes() -> list[Component]:
     if "control_mixer" in simulator.components:
         nodes.append(ControlMixer(simulator.loop, simulator.log))
     if "analysis" in simulator.components:
+        # Here: it loads for half a second, and what the simulator refuses need not wait for it.
+        from sbs_sim.nodes.analysis import Analysis
+
         nodes.append(Analysis(simulator.loop, simulator.log))
     if simulator.log is not None:
         nodes.append(simulator.log)

@@ -67,11 +67,15 @@ def flight(tmp_path_factory):
 @pytest.fixture
 def client(flight):
     """The client, with the aircraft playing in trimmed hover at the origin."""
-    assert flight.client.call(SetWind, "set_wind").success
-    assert flight.client.call(Reset, "reset").success
-    assert flight.client.call(SetBool, "pause", data=False).success
-    # what was published before the reset may still be on its way
-    flight.client.next("state", lambda m: np.abs([*vector(m.velocity), *body_rates(m)]).max() < 1e-3)
+    call = flight.client.call
+    assert call(SetBool, "pause", data=True).success
+    assert call(SetWind, "set_wind").success
+    assert call(Reset, "reset").success
+    begin = call(Step, "step", ticks=1)
+    assert begin.success
+    assert call(SetBool, "pause", data=False).success
+    # what was published before may still be on its way
+    flight.client.next("state", lambda m: stamp(m) >= begin.sim_time - 2e-9)
     return flight.client
 
 
@@ -134,9 +138,8 @@ def test_hovers_and_publishes_everything(client):
 def test_every_tick_is_published_once_with_its_time(client):
     client.next("state")
     first = len(client.messages["state"])
-    client.spin(1.0)
+    client.until(lambda: len(client.messages["state"]) > first + 100, "a hundred states")
     times = [stamp(message) for message in client.messages["state"][first:]]
-    assert len(times) > 10
     np.testing.assert_allclose(np.diff(times), 0.01, atol=2e-9)
 
 
@@ -305,10 +308,11 @@ def test_an_old_command_is_held_and_reported(flight, client, hover):
         return status and status.level == DiagnosticStatus.WARN and "timed out" in status.message
 
     climb = controls_message(hover.controls + [DEGREE, 0, 0, 0])
-    client.publish("controls", climb)
+    moved = client.publish_until("controls", climb, "state", lambda m: m.velocity.z < -0.05)
     client.next("diagnostics", warned)
     assert "holding the last one" in flight.simulator.output
-    client.next("state", lambda m: m.velocity.z < -0.1)  # states of before may still wait to be taken
+    held = client.next("state", lambda m: stamp(m) > stamp(moved) + 0.5)
+    assert held.velocity.z < moved.velocity.z
     client.publish_until("controls", climb, "diagnostics", lambda m: status_of(m, "simulator") and not warned(m))
 
 
@@ -316,9 +320,10 @@ def test_the_mixer_clips_says_so_once_and_follows_the_paper(flight, client):
     for _ in range(3):
         client.publish("controls", controls_message([1.0, 0.0, 0.02, 0.01]))
         client.spin(0.05)
-    array = client.next("diagnostics", lambda m: (s := status_of(m, "control_mixer")) and s.level)
-    assert "collective at its limit of 20 deg" in status_of(array, "control_mixer").message
-    assert flight.simulator.output.count("clipped: collective at its limit of 20 deg") == 1
+    limit = "collective at its limit of 20 deg"
+    array = client.next("diagnostics", lambda m: (s := status_of(m, "control_mixer")) and limit in s.message)
+    assert status_of(array, "control_mixer").level == DiagnosticStatus.WARN
+    assert flight.simulator.output.count(f"clipped: {limit}") == 1
     # section 2.1.1: B1s(1) = B1s - dB1s, B1s(2) = B1s + dB1s; it takes a moment, for the collective the longest
     moved = client.publish_until(
         "controls",
@@ -538,19 +543,27 @@ def test_a_command_from_before_a_reset_is_void(client, hover):
 
 
 def test_the_first_command_after_a_reset_moves_at_the_rate_of_the_actuators(client, hover):
-    seen = len(client.messages["swashplate"])
+    """120 deg/s; an output may be some milliseconds late, and the next one makes up for it."""
     target = hover.controls + [8 * DEGREE, 0, 0, 0]
-    client.publish_until(
-        "controls",
-        controls_message(target),
-        "swashplate",
-        lambda m: m.rotors[0].collective == pytest.approx(target[0]),
-    )
-    moved = [m.rotors[0].collective for m in client.messages["swashplate"][seen:]]
-    steps = np.diff([hover.controls[0], *moved])
-    # 120 deg/s; an output may be some milliseconds late, and the next one makes up for it
-    assert moved[0] - hover.controls[0] == pytest.approx(1.2 * DEGREE, rel=1e-6)
-    assert steps.max() < 6 * DEGREE
+
+    def outputs_to_the_target():
+        seen = len(client.messages["swashplate"])
+        client.publish_until(
+            "controls",
+            controls_message(target),
+            "swashplate",
+            lambda m: m.rotors[0].collective == pytest.approx(target[0]),
+        )
+        moved = [m.rotors[0].collective for m in client.messages["swashplate"][seen:]]
+        return np.diff([hover.controls[0], *moved])
+
+    for _ in range(5):  # on a busy machine outputs are lost: their topic keeps the last one
+        steps = outputs_to_the_target()
+        if steps[0] == pytest.approx(1.2 * DEGREE, rel=1e-6) and steps.max() < 6 * DEGREE:
+            break
+        assert client.call(Reset, "reset").success
+    else:
+        raise AssertionError(f"moved in steps of {np.degrees(steps)} deg")
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.2, 0.4, 0.7, 1.0])

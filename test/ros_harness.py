@@ -35,6 +35,9 @@ os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 keep_to_this_machine()
 MEASURED = "COVERAGE_PROCESS_CONFIG" in os.environ  # tools/coverage_report.py
 PATIENCE = 60.0  # s of wall time; generous, for machines that are busy; DDS alone takes 20 to miss a killed process
+# s that one look at the topics takes. Always the same: when it changes rclpy begins anew with the first topic, and the
+# last ones get nothing while there is more than can be taken.
+LOOK = 0.01
 
 
 def _domains() -> Iterator[int]:
@@ -227,8 +230,8 @@ class Client:
     def spin(self, seconds: float) -> None:
         """Receive for a while of wall time."""
         end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left)
+        while time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=LOOK)
 
     def until(self, condition: Callable[[], Any], what: str) -> Any:
         """Receive until a condition holds, and return its value."""
@@ -236,7 +239,7 @@ class Client:
         while time.monotonic() < end:
             if value := condition():
                 return value
-            self._executor.spin_once(timeout_sec=0.05)
+            self._executor.spin_once(timeout_sec=LOOK)
         raise AssertionError(f"waited {PATIENCE:g} s in vain for {what}")
 
     def next(self, topic: str, condition: Callable[[Any], Any] = lambda _: True) -> Any:

@@ -52,8 +52,10 @@ def test_a_command_from_before_the_one_in_force_is_refused(flight, hover):
     client = flight.client
     before = int(rejections(client)["rejected_messages"])
     last = now(client)
-    client.publish("controls", stamped(hover, last))
-    client.next("swashplate")
+    first = stamped(hover, last)
+    first.collective += 1e-4  # its own, as swashplates of before may still wait to be taken
+    client.publish("controls", first)
+    client.next("swashplate", lambda m: m.rotors[0].collective == pytest.approx(first.collective, rel=1e-9))
     client.publish("controls", stamped(hover, last - 10_000_000))
     after = client.until(
         lambda: (found := rejections(client)) and int(found["rejected_messages"]) > before and found, "it"

@@ -199,8 +199,9 @@ def test_tsitouras_steps_are_those_of_the_tableau():
     np.testing.assert_allclose(flight.flown(TSIT5)[2], x, rtol=1e-11, atol=1e-13)
 
 
-def test_a_tick_ends_before_what_is_implausible():
-    """The bound of the down coordinate is passed in the second step: the state is that after the first."""
+@pytest.mark.parametrize("state", [S.POSITION, S.POSITION + 2], ids=["north", "down"])
+def test_a_tick_ends_before_what_is_implausible(state):
+    """The bound of a state, were it the very first, is passed in the second step: the state is that after the first."""
     flight = Disturbed()
     after = [flight.x]
     for steps in (1, 2):
@@ -209,12 +210,11 @@ def test_a_tick_ends_before_what_is_implausible():
         cut.steps = steps
         after.append(cut.flown(RK4)[2])
     flight.air[W.TURBULENCE_TO : W.TURBULENCE_TO + 3] = flight.air[W.TURBULENCE_FROM : W.TURBULENCE_FROM + 3]
-    down = S.POSITION + 2
     bounds = np.full(flight.x.size + 1, np.inf)
-    bounds[down] = 0.5 * abs(after[1][down] + after[2][down])
-    assert abs(after[1][down]) < bounds[down] < abs(after[2][down])
+    bounds[state] = 0.5 * abs(after[1][state] + after[2][state])
+    assert abs(after[1][state]) < bounds[state] < abs(after[2][state])
     done, culprit, x = flight.flown(RK4, bounds)
-    assert (done, culprit) == (1, down)
+    assert (done, culprit) == (1, state)
     np.testing.assert_array_equal(x, after[1])
 
 

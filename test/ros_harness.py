@@ -366,6 +366,11 @@ def world(domain: int, folder: Path) -> Iterator[World]:
         made.client.close()
 
 
+def nanoseconds(message: Any) -> int:
+    """Time of a message with a header [ns]."""
+    return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+
+
 def controls_message(values: Any) -> Controls:
     """Message of pilot controls [rad], shape (4,)."""
     return Controls(**{name: float(value) for name, value in zip(CONTROL_NAMES, values, strict=True)})

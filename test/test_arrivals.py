@@ -7,7 +7,7 @@ rclpy = pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from rclpy.qos import QoSProfile  # noqa: E402
-from ros_harness import DOMAINS, controls_message, world  # noqa: E402
+from ros_harness import DOMAINS, controls_message, nanoseconds, world  # noqa: E402
 
 from sbs_msgs.msg import BodyState, Controls, SwashplateArray  # noqa: E402
 
@@ -31,15 +31,14 @@ def rejections(client):
     return {pair.key: pair.value for pair in status.values}
 
 
-def stamped(hover, nanoseconds):
+def stamped(hover, time_ns):
     message = controls_message(hover.controls)
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(nanoseconds, 10**9)
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(time_ns, 10**9)
     return message
 
 
 def now(client):
-    stamp = client.next("state").header.stamp
-    return stamp.sec * 10**9 + stamp.nanosec
+    return nanoseconds(client.next("state"))
 
 
 def told(client, text):

@@ -318,10 +318,8 @@ def test_what_is_not_finite_is_refused_and_changes_nothing(found):
 def test_the_first_controls_of_a_pilot_are_treated_like_all_others(sbs, model):
     """Beyond the range of the collective they are clipped, beyond reason refused by their name."""
     highest = sbs.control_ranges["collective"][1]
-    for start in (
-        model.trim,
-        trimmed_state(sbs, model.trim),
-    ):  # of a state alone the swashplates are where they are told
+    # of a state alone the swashplates are where they are told
+    for start in (model.trim, trimmed_state(sbs, model.trim)):
         flights = [fly(sbs, start, lambda t, x, c=c: [c, 0.0, 0.0, 0.0], 0.05) for c in (highest, highest + 0.3)]
         np.testing.assert_array_equal(flights[1]["state"], flights[0]["state"])
     for value in (math.nan, 2.0):

@@ -71,11 +71,9 @@ def client(flight):
     assert call(SetBool, "pause", data=True).success
     assert call(SetWind, "set_wind").success
     assert call(Reset, "reset").success
-    begin = call(Step, "step", ticks=1)
-    assert begin.success
+    _, hovering = stepped(flight.client, 1)  # what was published before that has come now
+    assert np.abs([*vector(hovering.velocity), *body_rates(hovering)]).max() < 1e-3
     assert call(SetBool, "pause", data=False).success
-    # what was published before may still be on its way
-    flight.client.next("state", lambda m: stamp(m) >= begin.sim_time - 2e-9)
     return flight.client
 
 
@@ -95,6 +93,15 @@ def body_rates(state):
 
 def stamp(message):
     return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+
+
+def stepped(client, ticks):
+    """Time [s] and state after so many ticks of a flight that is paused."""
+    answer = client.call(Step, "step", ticks=ticks)
+    assert answer.success
+    states = client.messages["state"]  # the last tick may have come before the answer
+    client.until(lambda: stamp(states[-1]) == pytest.approx(answer.sim_time, abs=2e-9), "the last tick")
+    return answer.sim_time, states[-1]
 
 
 def status_of(array, name):
@@ -192,15 +199,14 @@ def test_a_step_of_each_control_moves_its_axis(client, hover, control, read, sig
 def test_pause_step_and_play(client):
     assert client.call(SetBool, "pause", data=True).success
     paused = client.next("status", lambda m: m.state == SimulationStatus.PAUSED)
-    answer = client.call(Step, "step", ticks=7)
-    assert answer.success
-    assert answer.sim_time == pytest.approx(paused.sim_time + 0.07, abs=1e-9)
-    states = client.messages["state"]  # the last tick may have come before the answer
-    client.until(lambda: stamp(states[-1]) == pytest.approx(answer.sim_time, abs=2e-9), "the last tick")
+    seventh, _ = stepped(client, 7)
+    assert seventh == pytest.approx(paused.sim_time + 0.07, abs=1e-9)
     assert not client.call(Step, "step", ticks=0).success
-    client.next("status", lambda m: m.sim_time == pytest.approx(answer.sim_time))
+    eighth, _ = stepped(client, 1)
+    assert eighth == pytest.approx(seventh + 0.01, abs=1e-9)  # the refusal has moved nothing
+    client.next("status", lambda m: m.sim_time == pytest.approx(eighth))
     assert client.call(SetBool, "pause", data=False).success
-    client.next("state", lambda m: stamp(m) > answer.sim_time + 0.05)
+    client.next("state", lambda m: stamp(m) > eighth + 0.05)
     refused = client.call(Step, "step", ticks=1)
     assert not refused.success
     assert "paused" in refused.message
@@ -219,13 +225,16 @@ def test_reset_to_a_condition_and_to_a_state(client):
 
 
 def test_wind_moves_the_aircraft_and_a_gust_passes(client):
+    assert client.call(SetBool, "pause", data=True).success
     assert client.call(SetWind, "set_wind", gust=Vector3(z=-4.0), gust_duration=0.5).success
-    client.next("state", lambda m: m.velocity.z < -0.1)  # air that goes up takes the aircraft along
+    _, risen = stepped(client, 60)
+    assert risen.velocity.z < -0.1  # air that goes up takes the aircraft along
     answer = client.call(
         SetWind, "set_wind", velocity=Vector3(x=5.0), turbulence_intensity=Vector3(x=1.0, y=1.0, z=0.5)
     )
     assert answer.success
-    client.next("state", lambda m: m.velocity.x > 0.05)
+    _, state = stepped(client, 100)
+    assert state.velocity.x > 0.05
 
 
 @pytest.mark.parametrize(
@@ -311,8 +320,7 @@ def test_an_old_command_is_held_and_reported(flight, client, hover):
     moved = client.publish_until("controls", climb, "state", lambda m: m.velocity.z < -0.05)
     client.next("diagnostics", warned)
     assert "holding the last one" in flight.simulator.output
-    held = client.next("state", lambda m: stamp(m) > stamp(moved) + 0.5)
-    assert held.velocity.z < moved.velocity.z
+    assert client.next("state", lambda m: stamp(m) > stamp(moved) + 0.5).velocity.z < -0.1
     client.publish_until("controls", climb, "diagnostics", lambda m: status_of(m, "simulator") and not warned(m))
 
 
@@ -537,9 +545,8 @@ def test_a_command_from_before_a_reset_is_void(client, hover):
         client.spin(0.1)
     assert client.call(Reset, "reset").success
     client.spin(0.3)
-    assert client.call(Step, "step", ticks=20).success
-    client.spin(0.3)
-    np.testing.assert_allclose(vector(client.messages["state"][-1].velocity), 0.0, atol=1e-6)
+    _, state = stepped(client, 20)
+    np.testing.assert_allclose(vector(state.velocity), 0.0, atol=1e-6)
 
 
 def test_the_first_command_after_a_reset_moves_at_the_rate_of_the_actuators(client, hover):

@@ -19,6 +19,7 @@ from ros_harness import (  # noqa: E402
     EXECUTABLES,
     PATIENCE,
     environment,
+    nanoseconds,
     world,
 )
 from rosgraph_msgs.msg import Clock  # noqa: E402
@@ -39,10 +40,6 @@ from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
 def recorded(tmp_path_factory, hover):
     """Log of a second and a half."""
     return fly(tmp_path_factory.mktemp("recorded"), lambda made: wiggle(made, hover, 1.5))
-
-
-def to_nanoseconds(stamp):
-    return stamp.sec * 10**9 + stamp.nanosec
 
 
 def play(tmp_path, path, *arguments, act=lambda made: None, code=0):
@@ -69,7 +66,7 @@ def play(tmp_path, path, *arguments, act=lambda made: None, code=0):
 def test_replay_publishes_what_was_recorded(tmp_path, recorded):
     heard = ("--delay", 30, "--topics", *STATE_TOPICS)
     (received, _), log = play(tmp_path, recorded, *heard), read(recorded)
-    stamps = [to_nanoseconds(message.header.stamp) for message in received["state"]]
+    stamps = [nanoseconds(message) for message in received["state"]]
     assert stamps == log["state"].time_ns.tolist()
     assert received["/clock"]
     assert received["state"][-1].position.z == log["state"]["position.z"][-1]
@@ -268,7 +265,7 @@ def test_a_damaged_log_is_played_up_to_the_damage(tmp_path, recorded):
     received, output = play(tmp_path, damaged, "--rate", 5, "--delay", 30, "--topics", *STATE_TOPICS, code=1)
     states = read(recorded)["state"]
     expected = dict(zip(states.time_ns.tolist(), states["position.z"].tolist(), strict=True))
-    heights = {to_nanoseconds(message.header.stamp): message.position.z for message in received["state"]}
+    heights = {nanoseconds(message): message.position.z for message in received["state"]}
     assert 10 < len(heights) < len(expected)
     assert heights.items() <= expected.items()
     assert max(heights) < max(expected)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import ClusterError, SbsError
 from sbs_sim.model.kernel import digest_of
-from sbs_sim.versions import versions
+from sbs_sim.versions import in_words, versions
 
 if TYPE_CHECKING:
     import distributed
@@ -125,7 +125,8 @@ def _call(there: dict[str, str], call: bytes, data: bytes, contents: bytes) -> A
     for name, version in there.items():
         if here.get(name) != version:
             worker = distributed.get_worker().address
-            raise ClusterError(f"dask: worker {worker} has {name} {here.get(name)}: allowed is {version}, as here")
+            difference = in_words(name, version, here.get(name, ""), "where it is asked")
+            raise ClusterError(f"dask: worker {worker} would give other bits: {difference}")
     function, parameter_hash, arguments = cloudpickle.loads(call)
     aircraft, _ = _unpacked(data, contents)
     if aircraft.parameter_hash != parameter_hash:

@@ -32,10 +32,11 @@ HOVER_STEP = Path(__file__).resolve().parent.parent / "bags" / "hover_step.mcap"
 STATE_TOPICS = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "odom": Odometry, "/clock": Clock}
 
 
-def replay(*arguments, domain=1):
-    """Run the executable to its end."""
+def replay(*arguments, domain=1, **variables):
+    """Run the executable to its end, with further variables of the environment."""
     command = [sys.executable, str(EXECUTABLES / "replay"), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=environment(domain))
+    found = {**environment(domain), **variables}
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=found)
 
 
 def fly(tmp_path, act, **parameters):

@@ -117,13 +117,21 @@ def test_commands_print_the_same_with_a_cluster(address):
         assert output(*call, "--dask", address) == output(*call)
 
 
-def test_a_worker_with_other_versions_is_refused_by_name(address):
-    versions = {**_versions(), "numba": "0.1"}
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        ({"numba": "0.1"}, "numba: 0.1 where it is asked, {numba} here"),
+        ({"target": "generic"}, "target: generic where it is asked, {target} here"),
+        ({"target_features": "b,d,a,c,e"}, "target_features: a, b, c and 2 more only where it is asked, "),
+    ],
+)
+def test_a_worker_with_other_versions_is_refused_by_name(address, other, said):
     with distributed.Client(address, set_as_default=False) as client:
-        error = client.submit(_call, versions, b"", b"", b"", pure=False).exception()
+        error = client.submit(_call, {**_versions(), **other}, b"", b"", b"", pure=False).exception()
     assert isinstance(error, ClusterError)
     assert str(error).startswith("dask: worker tcp://127.0.0.1:")
-    assert str(error).endswith(f" has numba {_versions()['numba']}: allowed is 0.1, as here")
+    assert f" would give other bits: other {said.format(**_versions())}" in str(error)
+    assert len(str(error)) < 240
 
 
 def test_an_address_where_nobody_answers_is_told_in_one_line(sbs):

@@ -34,6 +34,7 @@ from sbs_msgs.msg import (  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
 from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
+from sbs_sim.versions import compilation_target, differences  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -351,7 +352,21 @@ def test_the_log_that_comes_along_is_flown_again():
         assert np.ptp(log["controls"][name]) == pytest.approx(math.radians(0.5), rel=1e-6)
     found = replay("--verify", HOVER_STEP)
     assert found.returncode == 0, found.stdout
-    assert "identical" in found.stdout or "within" in found.stdout
+    same = not differences(log.metadata["versions"])
+    assert found.stdout.startswith(
+        "identical, 401 states\n" if same else ("identical", "within the tolerance of 1e-06")
+    )
+
+
+def test_another_target_is_told_in_short_after_the_verdict(recorded):
+    """Kernels that are compiled for another processor round otherwise, and no two lists of features are alike."""
+    target = "haswell" if compilation_target()["target"] != "haswell" else "x86-64-v3"
+    found = replay("--verify", recorded, NUMBA_CPU_NAME=target, NUMBA_CPU_FEATURES="")
+    assert found.returncode == 0, found.stdout
+    lines = found.stdout.splitlines()
+    assert lines[0].startswith(("identical, ", "within the tolerance of 1e-06 for other versions, "))
+    assert f"other target: {compilation_target()['target']} recorded, {target} here" in lines
+    assert max(len(line) for line in lines) < 160
 
 
 def test_commands_act_at_their_time_on_rotors_of_another_speed(tmp_path, hover):

@@ -39,9 +39,10 @@ from sbs_sim.nodes.recorder import Recorder, definition_file
 from sbs_sim.progress import progress_bar
 from sbs_sim.recording import Log, message_definition, read, recover
 from sbs_sim.recording.definitions import parse
-from sbs_sim.recording.flight import TOLERANCE, Flight, flight_of, verify, whole_until
+from sbs_sim.recording.flight import TOLERANCE, Flight, Verification, flight_of, verify, whole_until
 from sbs_sim.recording.playback import Playback
 from sbs_sim.simulation import begun, refly
+from sbs_sim.versions import in_words
 
 Progress = Callable[[float, float], None]  # takes what is done and the total
 
@@ -540,23 +541,26 @@ def _verify(path: Path) -> int:
     flight = _flight(path)
     with progress_bar("state") as progress:
         found = verify(flight, progress)
-    for name, (recorded, here) in found.other_versions.items():
-        print(f"other {name}: {recorded or 'unknown'} recorded, {here} here")
-    if found.identical:
-        print(f"identical, {found.states} states")
-        return 0
+    print(_verdict(found))
     for title, difference in (("first", found.first), ("largest", found.largest)):
-        if difference is None:
-            continue
-        print(
-            f"{title} difference: step {difference.step} (t = {difference.time:.4f} s), {difference.state}:"
-            f" {difference.logged!r} recorded, {difference.flown!r} flown"
-        )
-    if found.other_versions:
-        within = "within" if found.within_tolerance else "beyond"
-        print(f"with other versions {found.states} states are compared by a tolerance: {within} {TOLERANCE:g}")
-        return 0 if found.within_tolerance else 1
-    return 1
+        if difference is not None:
+            print(
+                f"{title} difference: step {difference.step} (t = {difference.time:.4f} s), {difference.state}:"
+                f" {difference.logged!r} recorded, {difference.flown!r} flown"
+            )
+    for name, (recorded, here) in found.other_versions.items():
+        print(in_words(name, recorded, here))
+    return 0 if found.passed else 1
+
+
+def _verdict(found: Verification) -> str:
+    """What became of a log that was flown again, in one line."""
+    if found.identical:
+        return f"identical, {found.states} states"
+    if not found.other_versions:
+        return f"different, though the versions are the same: {found.states} states"
+    within = "within" if found.within_tolerance else "beyond"
+    return f"{within} the tolerance of {TOLERANCE:g} for other versions, {found.states} states"
 
 
 def _flight(path: Path) -> Flight:

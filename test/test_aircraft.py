@@ -131,7 +131,8 @@ def test_the_two_aircraft_differ_in_what_the_paper_leaves_open_only(sbs, sbs_pap
             for field in dataclasses.fields(Rotor)
             if not np.array_equal(getattr(ours, field.name), getattr(theirs, field.name))
         }
-        assert differing == {"swashplate_phase", "airfoil"}
+        assert differing == {"swashplate_phase", "airfoil", "lag_damping"}
+        assert theirs.lag_damping == 0.0  # Table 6 has no damper
         assert ours.swashplate_phase == pytest.approx(math.radians(-72))
         assert theirs.swashplate_phase == 0
         assert (ours.airfoil, theirs.airfoil) == ("naca0012", "linear_573")

@@ -188,7 +188,7 @@ def fixed_hub(coupling, **rotor):
 
     Masses and springs are a billionth, which leaves the motion of the blades as it is, on the heavy body.
     """
-    values = {"flap_spring": 162.0, "lag_spring": 0.0, "blade_mass": 0.1613, **rotor}
+    values = {"flap_spring": 162.0, "lag_spring": 0.0, "lag_damping": 0.0, "blade_mass": 0.1613, **rotor}
     values |= {key: values[key] * 1e-9 for key in ("flap_spring", "lag_spring", "blade_mass")}
     return build(
         environment=WEIGHTLESS_VACUUM,

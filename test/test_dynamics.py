@@ -236,14 +236,14 @@ def test_heading_place_and_common_motion_do_not_matter(sbs, seed, heading, drift
 
 
 def stand(name="sbs", options=None, environment=None, folder=None, **rotor):
-    """Return one rotor, MR2's, at the c.g. of a body too heavy to be moved."""
+    """Return one rotor, MR2's but for its lag damper, at the c.g. of a body too heavy to be moved."""
     return build(
         name,
         folder,
         environment=WEIGHTLESS_VACUUM if environment is None else environment,
         body=TEST_STAND,
         options=options,
-        rotors=[{"hub": [0.0, 0.0, 0.0], "rotation": 1, **rotor}],
+        rotors=[{"hub": [0.0, 0.0, 0.0], "rotation": 1, "lag_damping": 0.0, **rotor}],
     )
 
 

@@ -464,3 +464,23 @@ def test_settled_states_are_those_of_the_zero_rates():
 def test_states_that_integrate_do_not_settle():
     with pytest.raises(LinearizationError, match="do not settle: their matrix is singular"):
         settle(np.array([[-1.0, 1.0], [1.0, 0.0]]), np.ones((2, 1)), [0])
+
+
+# -- lag dampers of the aircraft that flies by default ---------------------------------------------------------------
+
+
+def slowest_decay(aircraft):
+    """Largest real part of a rotor mode from 0 to 20 m/s [1/s]."""
+    rotor = ("flap", "lag", "coning", "inflow")
+    return max(
+        mode.pole.real
+        for speed in np.arange(0.0, 20.1, 2.5)
+        for mode in linearize(aircraft, airspeed=speed).modes
+        if any(word in mode.name for word in rotor)
+    )
+
+
+def test_the_lag_dampers_are_the_least_with_which_every_rotor_mode_decays(sbs):
+    assert slowest_decay(sbs) < -1.0
+    assert slowest_decay(sbs.with_value("rotors.lag_damping", 0.98 * sbs.rotors[0].lag_damping)) > -1.0
+    assert slowest_decay(sbs.with_value("rotors.lag_damping", 0.0)) > 0.0  # the paper's: it grows

@@ -17,6 +17,7 @@ import numpy as np
 
 from sbs_sim import Aircraft, linearize, simulate, trim
 from sbs_sim.analysis.floquet import floquet
+from sbs_sim.analysis.reproduce import undamped_sbs
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.two_loop import _TwoLoops
 from sbs_sim.errors import TrimError
@@ -67,8 +68,8 @@ CHOICES: list[tuple[str, str, dict[str, Any], dict[str, bool]]] = [
 
 
 def changed(name: str, changes: Mapping[str, Any]) -> Aircraft:
-    """Aircraft of a file with other values."""
-    aircraft = Aircraft.load(name)
+    """Aircraft of a file with other values; `sbs` without lag dampers, as the paper's."""
+    aircraft = undamped_sbs() if name == "sbs" else Aircraft.load(name)
     for path, value in changes.items():
         aircraft = aircraft.with_value(path, value)
     return aircraft
@@ -115,7 +116,7 @@ def forward_row(aircraft: Aircraft, fidelity: Mapping[str, bool]) -> str:
 
 def stepping() -> None:
     """Error of a quarter of a second after stick steps, by method and azimuth step."""
-    aircraft = Aircraft.load("sbs")
+    aircraft = undamped_sbs()
     point = trim(aircraft)
     controls = point.controls + np.radians([1.0, 1.0, 2.0, 1.0])
 
@@ -131,7 +132,7 @@ def stepping() -> None:
 
 def azimuths() -> None:
     """Effect of N_c at 15 m/s."""
-    aircraft = Aircraft.load("sbs")
+    aircraft = undamped_sbs()
     exact = linearize(aircraft, FORWARD, azimuth_count=96)
     for count in (1, 2, 3, 6, 12, 24):
         model = linearize(aircraft, FORWARD, azimuth_count=count)
@@ -142,7 +143,7 @@ def azimuths() -> None:
 
 def differences() -> None:
     """Effect of the step of the central differences on the poles."""
-    aircraft = Aircraft.load("sbs")
+    aircraft = undamped_sbs()
     for speed in (0.0, FORWARD):
         exact = linearize(aircraft, speed)
         for scale in (0.01, 0.1, 3.0):
@@ -153,7 +154,7 @@ def differences() -> None:
 
 def exponents() -> None:
     """Floquet exponents beside the poles of the averaged model."""
-    aircraft = Aircraft.load("sbs")
+    aircraft = undamped_sbs()
     for speed in (0.0, 5.0, 10.0, 15.0, 20.0, 25.0):
         point = trim(aircraft, speed)
         found, spread = floquet(aircraft, point), linearize(aircraft, point=point).azimuth_spread
@@ -164,7 +165,7 @@ def exponents() -> None:
 
 def two_loops() -> None:
     """The paper's nested loops beside Newton's method."""
-    aircraft = Aircraft.load("sbs")
+    aircraft = undamped_sbs()
     cases = [{"airspeed": v} for v in (0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 15.0)]
     cases += [{"climb_rate": v} for v in (-1.0, 3.0)] + [{"airspeed": 5.0, "sideslip": math.pi / 2}]
     for fidelity in ({}, WITHOUT_CYCLIC_INFLOW):
@@ -192,7 +193,7 @@ def arctangent() -> None:
 
 def outer_gains() -> None:
     """Gains of the outer loop about Newton's solution, for symmetric and antisymmetric departures."""
-    aircraft = Aircraft.load("sbs")
+    aircraft = undamped_sbs()
     for fidelity, speed in (({}, 0.0), ({}, 2.0), (WITHOUT_CYCLIC_INFLOW, 0.0), (WITHOUT_CYCLIC_INFLOW, FORWARD)):
         point = trim(aircraft, speed, **fidelity)
         problem = TrimProblem(aircraft, True, not fidelity, point.azimuth_count)
@@ -222,7 +223,7 @@ def _rotor_names(names: list[str], problem: TrimProblem) -> list[str]:
 
 def couplings() -> None:
     """Poles of the paper's coupling beside those of the complete one, in hover."""
-    complete = linearize(Aircraft.load("sbs"))
+    complete = linearize(undamped_sbs())
     loose = linearize(changed("sbs", LOOSE))
     for name, wanted in (("body", True), ("rotors", False)):
         change = {
@@ -236,20 +237,20 @@ def couplings() -> None:
 
 def lag_damping() -> None:
     """Right-most lag mode by damper and speed."""
-    for damper in (0.0, 0.1, 0.5):
+    for damper in (0.0, 0.022, 0.1, 0.5):
         aircraft = changed("sbs", {"rotors.lag_damping": damper})
-        for speed in (0.0, FORWARD, 25.0):
+        for speed in (0.0, FORWARD, 20.0, 25.0):
             lag = [mode for mode in linearize(aircraft, speed).modes if " lag" in mode.name]
             worst = max(lag, key=lambda mode: mode.pole.real)
-            print(f"  {damper:.1f} N m s, {speed:4.1f} m/s: {worst.name} {worst.pole:.3f}")
+            print(f"  {damper:.3f} N m s, {speed:4.1f} m/s: {worst.name} {worst.pole:.3f}")
 
 
 def constructions() -> None:
     """Largest difference of A by both methods, states in their steps, over its largest element."""
     for name in ("sbs", "sbs_paper"):
         for speed in (0.0, FORWARD):
-            one, other = (linearize(Aircraft.load(name), speed, method=method).a for method in ("averaged", "paper"))
-            steps = linearize(Aircraft.load(name), speed).steps[: len(one)]
+            one, other = (linearize(changed(name, {}), speed, method=method).a for method in ("averaged", "paper"))
+            steps = linearize(changed(name, {}), speed).steps[: len(one)]
             scale = steps / steps[:, None]
             print(f"  {name}, {speed:4.1f} m/s: {np.abs((one - other) * scale).max() / np.abs(one * scale).max():.1e}")
 

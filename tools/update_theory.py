@@ -32,9 +32,10 @@ SPEEDS = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0)  # m/s
 NOTHING = 1e-6  # what is smaller is rounding
 
 INTRODUCTION = (
-    "`sbs` is the complete model (poles of the full matrix), reading the paper's reading `sbs_paper` (poles of the"
-    " quasi-static matrix). Frequencies and damping ratios follow from the poles and are left out. A ratio in bold is"
-    " more than a fifth off, or compares a real pole with a pair; the letters are the notes below."
+    "`sbs` is the complete model (poles of the full matrix; without lag dampers, of which the paper names none),"
+    " reading the paper's reading `sbs_paper` (poles of the quasi-static matrix). Frequencies and damping ratios"
+    " follow from the poles and are left out. A ratio in bold is more than a fifth off, or compares a real pole"
+    " with a pair; the letters are the notes below."
 )
 
 

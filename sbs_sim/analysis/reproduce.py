@@ -232,7 +232,7 @@ def reproduce(
     Parameters
     ----------
     aircraft : Aircraft, optional
-        The complete model, `sbs` if not given.
+        The complete model, `undamped_sbs` if not given.
     paper_aircraft : Aircraft, optional
         The paper's reading, `sbs_paper` if not given.
     progress : callable, optional
@@ -249,7 +249,7 @@ def reproduce(
     """
     reading = paper_aircraft or Aircraft.load("sbs_paper")
     craft = {
-        COMPLETE: aircraft or Aircraft.load("sbs"),
+        COMPLETE: aircraft or undamped_sbs(),
         READING: reading,
         READING_NACA: reading.with_value("rotors.airfoil", AIRFOIL),
     }
@@ -281,17 +281,21 @@ def reproduce(
     )
 
 
+def undamped_sbs() -> Aircraft:
+    """The aircraft `sbs` without lag dampers: the paper names none."""
+    return Aircraft.load("sbs").with_value("rotors.lag_damping", 0.0)
+
+
 def _other_aircraft(craft: Mapping[str, Aircraft]) -> tuple[str, ...]:
     """A warning where an aircraft is not the one that the remarks are written for."""
-    usual = {COMPLETE: "sbs", READING: "sbs_paper"}
-    others = [
-        craft[name].name
-        for name, own in usual.items()
-        if craft[name].parameter_hash != Aircraft.load(own).parameter_hash
-    ]
+    usual = {COMPLETE: undamped_sbs(), READING: Aircraft.load("sbs_paper")}
+    others = [craft[name].name for name, own in usual.items() if craft[name].parameter_hash != own.parameter_hash]
     if not others:
         return ()
-    return (f"Not the paper's aircraft: {' and '.join(others)}. The remarks are written for sbs and sbs_paper.",)
+    return (
+        f"Not the paper's aircraft: {' and '.join(others)}. The remarks are written for sbs without lag dampers and for"
+        " sbs_paper.",
+    )
 
 
 class _Steps:
@@ -517,7 +521,7 @@ def _facts(computed: _Computed, tables: Mapping[str, Comparison]) -> dict[str, A
     in that of eq. [14]. "rotor_poles": those of the complete matrix by mode. "lambdac_reversed": quasi-static poles of
     Table 4 with the sign of lambdac reversed in all loads. "lag_changes_M_q": relative, from Table 1 to Table 2.
     """
-    papers = Aircraft.load("sbs")  # whatever was computed, the printed poles are of this one
+    papers = undamped_sbs()  # whatever was computed, the printed poles are of this one
     printed = {table: _implied_damping(tables[table], papers) for table in FIDELITIES}
     hubs = {
         table: {

@@ -26,7 +26,9 @@ def make_parser() -> argparse.ArgumentParser:
         description="Compute the paper's Tables 1 to 5, its inflow poles and its trims, and print them beside the"
         " printed values, with their ratios; remarks say why something differs.",
     )
-    parser.add_argument("--aircraft", default="sbs", metavar="NAME", help="the complete model (default: sbs)")
+    parser.add_argument(
+        "--aircraft", metavar="NAME", help="the complete model (default: sbs without lag dampers; the paper names none)"
+    )
     parser.add_argument(
         "--paper-aircraft", default="sbs_paper", metavar="NAME", help="the paper's reading (default: sbs_paper)"
     )
@@ -40,10 +42,11 @@ def make_parser() -> argparse.ArgumentParser:
 def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.aircraft import Aircraft
     from sbs_sim.analysis.export import check_target, to_json, write
-    from sbs_sim.analysis.reproduce import reproduce
+    from sbs_sim.analysis.reproduce import reproduce, undamped_sbs
 
     check_target(arguments.json)
-    craft, paper_craft = Aircraft.load(arguments.aircraft), Aircraft.load(arguments.paper_aircraft)
+    craft = Aircraft.load(arguments.aircraft) if arguments.aircraft else undamped_sbs()
+    paper_craft = Aircraft.load(arguments.paper_aircraft)
     if arguments.out:  # a bad path is told before the work, not after it
         from sbs_sim.analysis.page import make_folder
 

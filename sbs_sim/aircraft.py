@@ -8,6 +8,7 @@ import hashlib
 import itertools
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
@@ -17,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim import checks, config_file
-from sbs_sim.aircraft_values import places, replaced, separate, value_at
+from sbs_sim.aircraft_values import Place, mirrored, places, replaced, separate, value_at
+from sbs_sim.content import ByContent
 from sbs_sim.errors import AircraftError, AirfoilError
 from sbs_sim.model import params as P
 from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells, read_table
@@ -27,6 +29,7 @@ from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES, StateLayout
 Array = NDArray[np.float64]
 Range = tuple[float, float]
 NOT_PHYSICS = ("name", "airfoil", "collective_range", "cyclic_range", "swashplate_rate")  # of a rotor, for the model
+MOST_TOLD = 5  # changes that a refusal names
 LEAST_DENSITY = 1e-12  # kg/m^3, less than at 300 km: a vacuum
 
 
@@ -39,8 +42,8 @@ class Environment:
     gravity: float
 
 
-@dataclass(frozen=True)
-class Body:
+@dataclass(frozen=True, eq=False)
+class Body(ByContent):
     """The whole aircraft, blades included.
 
     Attributes
@@ -68,8 +71,8 @@ class Options:
     elements: int
 
 
-@dataclass(frozen=True)
-class Rotor:
+@dataclass(frozen=True, eq=False)
+class Rotor(ByContent):
     """One rotor, SI units and radians; the keys of the aircraft file without `_deg` and `_rpm`.
 
     Attributes
@@ -150,8 +153,8 @@ class Rotor:
         return np.stack([span, chord, chord * width / 2, lift, twist])
 
 
-@dataclass(frozen=True)
-class Aircraft:
+@dataclass(frozen=True, eq=False)
+class Aircraft(ByContent):
     """An aircraft as its file describes it, checked.
 
     Attributes
@@ -272,16 +275,38 @@ class Aircraft:
             A path that does not exist, or a value with which the aircraft is not possible: one line that names path,
             value and what is allowed.
         """
-        if isinstance(value, (np.generic, np.ndarray)):
-            value = value.tolist()
-        data = self.data
-        for place in places(data, _schema(), path):
-            data = replaced(data, place, value)
+        return self.with_values({path: value})
+
+    def with_values(self, values: Mapping[str, Any]) -> "Aircraft":
+        """Aircraft with several values of its file changed, which are checked together and not one after the other.
+
+        Parameters
+        ----------
+        values : mapping of str to value
+            Paths and values as for `with_value`. Where two paths mean one place the later one counts:
+            {"rotors.radius": 0.4, "rotors.MR1.radius": 0.5}. An element of the inertia beside the diagonal is that on
+            the other side of it, too: "body.inertia[0][1]" is "body.inertia[1][0]".
+
+        Raises
+        ------
+        AircraftError
+            See `with_value`; or two values for the two sides of the inertia.
+        """
+        checks.instance("values", values, Mapping, AircraftError)
+        plain = {path: _python(value) for path, value in values.items()}
+        data, pairs = self.data, dict[Place, tuple[str, Any]]()
+        for path, value in plain.items():
+            for place in places(data, _schema(), path):
+                for one in (place, mirrored(place)):
+                    data = replaced(data, one, value)
+                _check_pair(pairs, place, path, value)
         try:
             return self._made_of(data, self.folder, self)
         except AircraftError as error:
-            named = str(error).startswith(f"{path} = ")
-            raise AircraftError(f"{error}" if named else f"{path} = {checks.shown(value)}: {error}") from None
+            raise AircraftError(_told_with(plain, str(error))) from None
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.parameter_hash))
 
     @cached_property
     def layout(self) -> StateLayout:
@@ -419,6 +444,33 @@ class Aircraft:
         pressure = density * math.pi * rotor.radius**2 * tip_speed**2
         row[P.LOAD_SCALE] = 1 / pressure if density > LEAST_DENSITY else 0.0
         return row
+
+
+def _python(value: Any) -> Any:
+    """A value as YAML gives it."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+
+
+def _check_pair(pairs: dict[Place, tuple[str, Any]], place: Place, path: str, value: Any) -> None:
+    """Raise AircraftError if the other side of a symmetric pair was given another value; keep this one."""
+    across = mirrored(place)
+    if across == place:
+        return
+    other, given = pairs.get(across, (path, value))
+    if given != value and other != path:
+        both = f"{other} = {checks.shown(given)}, {path} = {checks.shown(value)}"
+        raise AircraftError(f"{both}: allowed is one value, the inertia is symmetric")
+    pairs[place] = path, value
+
+
+def _told_with(values: Mapping[str, Any], error: str) -> str:
+    """What is wrong with an aircraft, with the changes that made it so, where it does not name them itself."""
+    named = [path for path in values if error.startswith(f"{path} = ")]
+    if named and len(values) == 1:
+        return error
+    changes = ", ".join(f"{path} = {checks.shown(value)}" for path, value in list(values.items())[:MOST_TOLD])
+    more = f" and {len(values) - MOST_TOLD} more" if len(values) > MOST_TOLD else ""
+    return f"{changes}{more}: {error}"
 
 
 def config_folder() -> Path:

@@ -10,6 +10,7 @@ from sbs_sim.errors import AircraftError
 
 Place = tuple[str | int, ...]
 
+SYMMETRIC: Place = ("body", "inertia")
 PATH = re.compile(r"[^.\[\]]+(\.[^.\[\]]+|\[\d{1,6}\])*")
 STEP = re.compile(r"\[(?P<index>\d+)\]|(?P<key>[^.\[\]]+)")
 # Of every number of a file by its last key; keys in _deg and _rpm say theirs.
@@ -108,6 +109,13 @@ def replaced(data: Any, place: Place, value: Any) -> Any:
     copy = data.copy()
     copy[place[0]] = replaced(data[place[0]], place[1:], value) if len(place) > 1 else value
     return copy
+
+
+def mirrored(place: Place) -> Place:
+    """Place with the same value by symmetry, that of an element of the inertia across its diagonal; else the same."""
+    if place[:-2] == SYMMETRIC and len(place) == len(SYMMETRIC) + 2:
+        return (*SYMMETRIC, place[-1], place[-2])
+    return place
 
 
 def separate(data: Any) -> Any:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint, trim
+from sbs_sim.content import ByContent
 from sbs_sim.errors import BatchError, SbsError
 from sbs_sim.model import state as S
 from sbs_sim.model.wind import Wind
@@ -37,8 +38,8 @@ MEMORY = 4e9  # bytes
 MOST_TICKS = 10**10  # of the longest flight with the shortest tick
 
 
-@dataclass(frozen=True)
-class Case:
+@dataclass(frozen=True, eq=False)
+class Case(ByContent):
     """One flight of a batch.
 
     Parameters
@@ -51,7 +52,7 @@ class Case:
         See `sbs_sim.simulate`; those of the trim if not given.
     wind : Wind
     changes : mapping
-        Values for `Aircraft.with_value` by path, with which this aircraft differs: {"body.mass": 22.0}. They are
+        Values for `Aircraft.with_values` by path, with which this aircraft differs: {"body.mass": 22.0}. They are
         made where the flight is flown. They must leave the number of rotors and blades alone.
     """
 
@@ -62,8 +63,8 @@ class Case:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Batch:
+@dataclass(frozen=True, eq=False)
+class Batch(ByContent):
     """Flights of a batch.
 
     Attributes
@@ -280,8 +281,8 @@ def _fly(
     """What is asked for of one flight, and its error."""
     try:
         layout = aircraft.layout
-        for path, value in changes.items():
-            aircraft = aircraft.with_value(path, value)
+        if changes:
+            aircraft = aircraft.with_values(changes)
         if aircraft.layout != layout:
             raise BatchError(f"changes = {changes}: allowed are those that leave the states as they are")
         if isinstance(start, Mapping):

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim.content import ByContent
 from sbs_sim.errors import SimulationError
 from sbs_sim.mixer import check_controls
 from sbs_sim.model import params as P
@@ -54,8 +55,8 @@ PLAUSIBLE_ANGLE = 1.5  # rad, multiblade coordinates of flap and lag
 PLAUSIBLE_INFLOW = 1.0
 
 
-@dataclass(frozen=True)
-class Snapshot:
+@dataclass(frozen=True, eq=False)
+class Snapshot(ByContent):
     """Everything that can be told of one instant.
 
     Attributes
@@ -91,8 +92,8 @@ class Snapshot:
     working: Array | None = None
 
 
-@dataclass(frozen=True)
-class Rows:
+@dataclass(frozen=True, eq=False)
+class Rows(ByContent):
     """Instants of a flight one below the other: what `Snapshot` tells, with one more axis in front of each.
 
     Attributes
@@ -115,8 +116,8 @@ class Rows:
         return Rows(*(getattr(self, part.name)[:count] for part in fields(self)))
 
 
-@dataclass(frozen=True)
-class Event:
+@dataclass(frozen=True, eq=False)
+class Event(ByContent):
     """Something that acts on a flight between two ticks: all events together repeat it bit for bit, see `refly`.
 
     Attributes

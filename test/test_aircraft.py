@@ -1023,3 +1023,48 @@ def test_the_hash_is_of_the_physics_alone(sbs):
     assert Aircraft.from_dict(copy.deepcopy(sbs.data)).parameter_hash == sbs.parameter_hash
     assert sbs.with_value("rotors.airfoil", "linear_573").parameter_hash != sbs.parameter_hash
     assert sbs.with_value("rotors.MR1.collective_range_deg", [0.0, 15.0]).parameter_hash == sbs.parameter_hash
+
+
+# -- several values at once -------------------------------------------------------------------------
+
+
+def test_values_that_are_possible_together_only_are_taken_in_any_order(sbs):
+    """A shorter blade needs its c.g. nearer to the hinge: neither may come first."""
+    changes = {"rotors.radius": 0.4, "rotors.blade_cg": 0.18}
+    with pytest.raises(AircraftError, match="blade_cg"):
+        sbs.with_value("rotors.radius", 0.4)
+    for order in (changes, dict(reversed(changes.items()))):
+        variant = sbs.with_values(order)
+        assert [(rotor.radius, rotor.blade_cg) for rotor in variant.rotors] == [(0.4, 0.18)] * 2
+    assert sbs.with_values({}) == sbs
+
+
+def test_of_two_paths_to_one_place_the_later_counts(sbs):
+    variant = sbs.with_values({"rotors.radius": 0.6, "rotors.MR2.radius": 0.55})
+    assert [rotor.radius for rotor in variant.rotors] == [0.6, 0.55]
+
+
+@pytest.mark.parametrize(("i", "j"), [(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)])
+def test_a_product_of_inertia_is_one_value(sbs, i, j):
+    inertia = sbs.with_value(f"body.inertia[{i}][{j}]", 0.07).body.inertia
+    expected = sbs.body.inertia.copy()
+    expected[i, j] = expected[j, i] = 0.07
+    assert np.array_equal(inertia, expected)
+    both = {f"body.inertia[{i}][{j}]": 0.07, f"body.inertia[{j}][{i}]": 0.07}
+    assert np.array_equal(sbs.with_values(both).body.inertia, expected)
+    both[f"body.inertia[{j}][{i}]"] = 0.08
+    with pytest.raises(AircraftError, match=r"= 0.07, .* = 0.08: allowed is one value, the inertia is symmetric"):
+        sbs.with_values(both)
+
+
+def test_what_is_impossible_together_is_told_with_all_that_was_changed(sbs):
+    with pytest.raises(AircraftError) as caught:
+        sbs.with_values({"rotors.radius": 0.4, "body.mass": 21.0})
+    assert str(caught.value).startswith(
+        "rotors.radius = 0.4, body.mass = 21.0: rotors[0].blade_cg = 0.224: allowed is <= 0.187639, "
+    )
+    many = {f"rotors[{i}].hub[{k}]": 0.1 * k for i in range(2) for k in range(3)} | {"body.mass": 0.5}
+    with pytest.raises(AircraftError, match=r"and 2 more: body.mass = 0.5: allowed is > 0.9678"):
+        sbs.with_values(many)
+    with pytest.raises(AircraftError, match="values = 5: allowed are objects of the class Mapping"):
+        sbs.with_values(5)

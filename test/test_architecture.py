@@ -67,13 +67,15 @@ def test_only_nodes_import_ros(name):
 ALLOWED = {
     "sbs_sim.errors": [],
     "sbs_sim.checks": ["sbs_sim.errors"],
-    "sbs_sim.model": ["sbs_sim.model", "sbs_sim.checks", "sbs_sim.errors"],
+    "sbs_sim.content": [],
+    "sbs_sim.model": ["sbs_sim.model", "sbs_sim.checks", "sbs_sim.content", "sbs_sim.errors"],
     "sbs_sim.aircraft_values": ["sbs_sim.checks", "sbs_sim.errors"],
     "sbs_sim.config_file": ["sbs_sim.checks", "sbs_sim.errors"],
     "sbs_sim.aircraft": [
         "sbs_sim.aircraft_values",
         "sbs_sim.checks",
         "sbs_sim.config_file",
+        "sbs_sim.content",
         "sbs_sim.model",
         "sbs_sim.errors",
     ],

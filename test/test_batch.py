@@ -77,6 +77,15 @@ def test_every_flight_is_the_single_one_to_the_last_bit(cases, workers, every):
     assert batch.time == pytest.approx(0.01 * every * np.arange(30 // every + 1), abs=1e-12)
 
 
+def test_changes_of_a_case_are_checked_together(sbs, hover):
+    changes = {"rotors.radius": 0.4, "rotors.blade_cg": 0.18, "body.inertia[0][2]": -0.03}
+    batch = simulate_batch([Case(sbs, {}, changes=changes)], 0.02, outputs=["state"])
+    assert batch.errors == (None,)
+    craft = sbs.with_values(changes)
+    point = trim(craft)
+    assert batch["state"][0].tobytes() == simulate(craft, point, point.controls, 0.02)["state"].tobytes()
+
+
 @pytest.mark.parametrize("options", [{"lead_lag": False, "cyclic_inflow": False}, {"method": "partitioned"}])
 def test_options_are_those_of_single_flights(cases, options):
     options = {**options, "azimuth_step": 0.2, "tick": 0.02}

@@ -15,7 +15,7 @@ import psutil
 import pytest
 from terminal import on_a_terminal
 
-from sbs_sim import linearize, trim
+from sbs_sim import Aircraft, linearize, trim
 
 EXECUTABLES = Path(__file__).resolve().parents[1] / "install" / "sbs_sim" / "lib" / "sbs_sim"
 PATIENCE = 60.0  # s, generous, for machines that are busy
@@ -94,6 +94,15 @@ def test_trim_of_changed_aircraft_by_the_other_method():
     assert "trim of sbs_paper: " in text
     assert re.search(r"two loops, \d+ outer and \d+ inner iterations, residual", text)
     assert sum(row(text, "thrust [N]")) == pytest.approx(22.5 * 9.80665, rel=1e-3)
+
+
+def test_changes_are_checked_together():
+    changes = ("--set", "rotors.radius=0.40", "--set", "rotors.blade_cg=0.18", "--set", "body.inertia[0][1]=0.02")
+    text = output("trim", *changes)
+    craft = Aircraft.load("sbs").with_values(
+        {"rotors.radius": 0.4, "rotors.blade_cg": 0.18, "body.inertia[0][1]": 0.02}
+    )
+    assert row(text, "power of all rotors") == [round(trim(craft).power.sum(), 2)]
 
 
 def test_trim_names_what_is_beyond_its_limits():

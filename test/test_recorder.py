@@ -414,7 +414,8 @@ def test_the_same_commands_on_a_changed_aircraft(tmp_path, hover):
     """Heavier: it sinks. The new log is one like any other."""
     path = fly(tmp_path, lambda made: wiggle(made, hover, 0.5))
     heavy = tmp_path / "heavy.mcap"
-    found = replay("--with", "body.mass=23", "--output", heavy, path)
+    changes = ("--with", "rotors.radius=0.40", "--with", "rotors.blade_cg=0.18", "--with", "body.inertia[0][1]=0.01")
+    found = replay("--with", "body.mass=23", *changes, "--output", heavy, path)
     assert found.returncode == 0, found.stderr
     assert read(heavy)["state"]["velocity.z"][-1] > read(path)["state"]["velocity.z"][-1] + 0.3
     assert_identical(heavy)

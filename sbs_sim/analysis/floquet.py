@@ -17,6 +17,7 @@ from scipy.optimize import linear_sum_assignment
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.linearize import difference_steps, jacobians, used_states
 from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim.content import ByContent
 from sbs_sim.errors import LinearizationError
 
 Array = NDArray[np.float64]
@@ -27,7 +28,7 @@ AZIMUTH_COUNTS = (8, 1000)
 
 
 @dataclass(frozen=True, eq=False)
-class Floquet:
+class Floquet(ByContent):
     """Characteristic exponents beside the poles of the averaged model.
 
     Attributes

@@ -19,6 +19,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import export
 from sbs_sim.analysis.modes import Mode, modes
 from sbs_sim.analysis.trim import TrimPoint, trim
+from sbs_sim.content import ByContent
 from sbs_sim.errors import LinearizationError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
@@ -45,7 +46,7 @@ LOADS |= {P.MOMENT + i: (f"hub_moment_{axis}", "N m") for i, axis in enumerate("
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModel:
+class LinearModel(ByContent):
     """x' = A x + B u, y = C x + D u for small departures from a trimmed flight.
 
     Attributes

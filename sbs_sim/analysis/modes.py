@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.content import ByContent
 from sbs_sim.model.state import Part, part_of
 
 Array = NDArray[np.float64]
@@ -27,7 +28,7 @@ COUPLED = 0.2  # share of flap, and of lag, from which a mode of the first matri
 
 
 @dataclass(frozen=True, eq=False)
-class Mode:
+class Mode(ByContent):
     """One real pole, or one conjugate pair.
 
     Attributes

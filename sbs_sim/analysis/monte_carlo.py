@@ -52,7 +52,7 @@ def gust_cases(
     seed : int
         Flight i is the same for the same seed, whatever the number of flights.
     spread : mapping of str to float, optional
-        Paths for `Aircraft.with_value`, and standard deviations relative to the value there: that of a flight is
+        Paths for `Aircraft.with_values`, and standard deviations relative to the value there: that of a flight is
         normally distributed around it.
 
     Returns

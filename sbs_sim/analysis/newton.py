@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.content import ByContent
+
 Array = NDArray[np.float64]
 Equations = Callable[[Array], Array]
 
@@ -20,8 +22,8 @@ GOOD_ENOUGH = 0.1  # a step that leaves less of the residual is followed by anot
 LARGEST_UNKNOWN = math.pi / 2  # angles and inflow ratios beyond it make no sense
 
 
-@dataclass(frozen=True)
-class Solution:
+@dataclass(frozen=True, eq=False)
+class Solution(ByContent):
     """Where Newton's method has ended.
 
     Attributes

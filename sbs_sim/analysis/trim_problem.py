@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.export import trim_to_dict
+from sbs_sim.content import ByContent
 from sbs_sim.errors import TrimError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
@@ -82,7 +83,7 @@ class TrimCondition:
 
 
 @dataclass(frozen=True, eq=False)
-class TrimPoint:
+class TrimPoint(ByContent):
     """A trimmed flight.
 
     Attributes

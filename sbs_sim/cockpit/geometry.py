@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft, Rotor
+from sbs_sim.content import ByContent
 from sbs_sim.model.frames import hub_axes
 from sbs_sim.model.multiblade import blade_matrix
 
@@ -17,8 +18,8 @@ THICKNESS = 0.12  # of a drawn blade, over its chord
 QUARTER = 0.25  # of the chord lies ahead of the blade's axis
 
 
-@dataclass(frozen=True)
-class Mesh:
+@dataclass(frozen=True, eq=False)
+class Mesh(ByContent):
     """Triangles.
 
     Attributes

@@ -3,11 +3,11 @@
 import argparse
 from typing import TYPE_CHECKING
 
+from sbs_sim.command_line import assignment
 from sbs_sim.commands.common import (
     add_flight_arguments,
     add_worker_arguments,
     aircraft,
-    assignment,
     execute,
     fixed,
     flight,

@@ -5,7 +5,6 @@ Nothing slow is imported here, so that `--help` and a wrong argument are answere
 
 import argparse
 import io
-import json
 import math
 import os
 import re
@@ -14,6 +13,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from sbs_sim.command_line import assignment
 from sbs_sim.errors import SbsError
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def add_aircraft_arguments(parser: argparse.ArgumentParser) -> None:
         type=assignment,
         metavar="PATH=VALUE",
         help="change a value of the aircraft file: body.mass=25, rotors.radius=0.5 (of every rotor),"
-        " rotors.MR1.hub[0]=0.01; may be given several times",
+        " rotors.MR1.hub[0]=0.01; may be given several times, and is then checked together",
     )
 
 
@@ -113,32 +113,12 @@ def add_worker_arguments(group: "argparse._ArgumentGroup") -> None:
     )
 
 
-def assignment(text: str) -> tuple[str, Any]:
-    """Path and value of PATH=VALUE."""
-    path, equals, value = text.partition("=")
-    if not equals or not path:
-        raise argparse.ArgumentTypeError(f"{text!r}: allowed is PATH=VALUE, for example body.mass=25")
-    return path.strip(), _value(value.strip())
-
-
-def _value(text: str) -> Any:
-    """Number or list as JSON writes it, any other text as it is."""
-    for read in (json.loads, float):
-        try:
-            return read(text)
-        except (ValueError, RecursionError):
-            continue
-    return text
-
-
 def aircraft(arguments: argparse.Namespace) -> "Aircraft":
     """The aircraft that the arguments tell."""
     from sbs_sim.aircraft import Aircraft
 
     chosen = Aircraft.load(arguments.aircraft)
-    for path, value in arguments.set:
-        chosen = chosen.with_value(path, value)
-    return chosen
+    return chosen.with_values(dict(arguments.set)) if arguments.set else chosen
 
 
 def flight(arguments: argparse.Namespace) -> dict[str, Any]:

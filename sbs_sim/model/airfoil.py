@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sbs_sim.content import ByContent
 from sbs_sim.errors import AirfoilError
 from sbs_sim.model.kernel import kernel
 
@@ -27,7 +28,7 @@ STEP_TOLERANCE = 0.01  # of a step, for angles that were rounded in the file
 
 
 @dataclass(frozen=True, eq=False)
-class AirfoilTable:
+class AirfoilTable(ByContent):
     """Lift and drag coefficients of one airfoil over the full circle.
 
     Attributes

@@ -88,18 +88,22 @@ class Wind:
     turbulence_seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check every field."""
+        """Check every field, and make plain numbers of them, so that equal winds are equal."""
         for name in ("velocity", "gust", "turbulence_intensity"):
             least = 0.0 if name == "turbulence_intensity" else -LARGEST_WIND
             values = getattr(self, name)
             if not isinstance(values, Sequence | np.ndarray) or len(values) != 3:
                 allowed = "allowed are 3 values, north, east, down [m/s]"
                 raise SimulationError(f"{name} = {checks.shown(values)}: {allowed}")
-            for axis, value in zip("xyz", values, strict=True):
+            numbers = [
                 checks.number(f"{name}.{axis}", value, least, LARGEST_WIND, "m/s", SimulationError)
+                for axis, value in zip("xyz", values, strict=True)
+            ]
+            object.__setattr__(self, name, tuple(numbers))
         for name, (least, most, unit) in RANGES.items():
-            checks.number(name, getattr(self, name), least, most, unit, SimulationError)
-        checks.whole("turbulence_seed", self.turbulence_seed, 0, 2**64 - 1, SimulationError)
+            object.__setattr__(self, name, checks.number(name, getattr(self, name), least, most, unit, SimulationError))
+        seed = checks.whole("turbulence_seed", self.turbulence_seed, 0, 2**64 - 1, SimulationError)
+        object.__setattr__(self, "turbulence_seed", seed)
 
 
 class WindField:

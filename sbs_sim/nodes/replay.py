@@ -31,6 +31,7 @@ from std_srvs.srv import SetBool
 
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.command_line import assignment
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
 from sbs_sim.nodes.executables import INTERRUPTED
@@ -316,7 +317,7 @@ def fly_with(
     ----------
     flight : Flight
     changes : sequence of str
-        "PATH=VALUE" each, see `Aircraft.with_value`.
+        "PATH=VALUE" each, see `Aircraft.with_values`.
     last : int
         Step to end at.
     output : Path
@@ -336,9 +337,7 @@ def fly_with(
     SbsError
         A change that is not possible, a log that cannot be written.
     """
-    aircraft = flight.aircraft
-    for change in changes:
-        aircraft = changed(aircraft, change)
+    aircraft = changed(flight.aircraft, changes)
     # rotors of another speed have another step: what acted acts at the same time
     step_size = begun(aircraft, flight.events, **flight.options).step_size
     shorter = flight.step_size / step_size
@@ -357,22 +356,18 @@ def fly_with(
     return log.path, round(steps / shorter)
 
 
-def changed(aircraft: Aircraft, change: str) -> Aircraft:
-    """Aircraft with a change "PATH=VALUE".
+def changed(aircraft: Aircraft, changes: Sequence[str]) -> Aircraft:
+    """Aircraft with changes "PATH=VALUE".
 
     Raises
     ------
     SbsError
-        It is not of that form, or not possible.
+        One is not of that form, or all together are not possible.
     """
-    path, equals, text = change.partition("=")
-    if not equals:
-        raise SbsError(f"--with {change}: allowed is KEY=VALUE, such as body.mass=22.5")
     try:
-        value = YAML(typ="safe", pure=True).load(text)
-    except Exception:
-        raise SbsError(f"--with {change}: the value is not readable") from None
-    return aircraft.with_value(path, value)
+        return aircraft.with_values(dict(map(assignment, changes)))
+    except argparse.ArgumentTypeError as error:
+        raise SbsError(f"--set {error}") from None
 
 
 def _write_flight(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim.analysis.linearize import LinearModel, settle
+from sbs_sim.content import ByContent
 from sbs_sim.errors import PilotError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
@@ -24,7 +25,7 @@ FED_BACK = ("q", "theta", "p", "phi", "r")
 
 
 @dataclass(frozen=True, eq=False)
-class Augmentation:
+class Augmentation(ByContent):
     """Gains of the augmentation, and what they give.
 
     Attributes

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_continuous_are
 
+from sbs_sim.content import ByContent
 from sbs_sim.errors import PilotError
 
 Array = NDArray[np.float64]
@@ -25,7 +26,7 @@ BATCH = 200  # frequencies that are computed together
 
 
 @dataclass(frozen=True, eq=False)
-class Plant:
+class Plant(ByContent):
     """x' = a x + b u, y = c x.
 
     Attributes
@@ -41,7 +42,7 @@ class Plant:
 
 
 @dataclass(frozen=True, eq=False)
-class Compensator:
+class Compensator(ByContent):
     """Once a tick: u = c s + d y, then s becomes a s + b y. The signs are those that fly: no minus outside.
 
     Attributes

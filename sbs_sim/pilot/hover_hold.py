@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.analysis.linearize import LinearModel, settle
+from sbs_sim.content import ByContent
 from sbs_sim.errors import PilotError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion, quaternion_to_euler, rotation_matrix
@@ -53,7 +54,7 @@ LARGEST = 1e9  # of any value of a state that can be flown by: squares and produ
 
 
 @dataclass(frozen=True, eq=False)
-class HoverModel:
+class HoverModel(ByContent):
     """What the design takes of a linear model of hover: x' = a x + b u about the trim.
 
     Attributes
@@ -111,7 +112,7 @@ class HoverModel:
 
 
 @dataclass(frozen=True, eq=False)
-class HoverHoldDesign:
+class HoverHoldDesign(ByContent):
     """Gains of the hover hold, and what they give.
 
     Attributes

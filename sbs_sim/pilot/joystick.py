@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sbs_sim import checks, config_file
 from sbs_sim.aircraft import config_folder
+from sbs_sim.content import ByContent
 from sbs_sim.errors import PilotError
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.pilot.sticks import shaped
@@ -21,8 +22,8 @@ PRESSED = 0.5  # of an axis that stands for two buttons
 ACTIONS = ("augmentation", "take_trim", "first_trim")
 
 
-@dataclass(frozen=True)
-class JoystickFile:
+@dataclass(frozen=True, eq=False)
+class JoystickFile(ByContent):
     """Checked content of a joystick file.
 
     Attributes
@@ -81,7 +82,7 @@ def _validator() -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class Reading(ByContent):
     """What one message of a joystick says.
 
     Attributes

@@ -15,6 +15,7 @@ from ruamel.yaml import YAML
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.content import ByContent
 from sbs_sim.errors import RecordingError
 from sbs_sim.model.wind import Wind
 from sbs_sim.recording.log import Log, Topic
@@ -38,8 +39,8 @@ LATEST_STATE = 10**17  # ns, three years of flight
 LONGEST_GAP = 1e4  # s without a state; to fly through a damaged time would take for ever
 
 
-@dataclass(frozen=True)
-class Flight:
+@dataclass(frozen=True, eq=False)
+class Flight(ByContent):
     """A recorded flight.
 
     Attributes
@@ -68,7 +69,7 @@ class Flight:
     states: Array
     step_size: float
     versions: dict[str, str]
-    folder: "tempfile.TemporaryDirectory[str]" = field(repr=False)
+    folder: "tempfile.TemporaryDirectory[str]" = field(repr=False, compare=False)
 
 
 @dataclass(frozen=True)

@@ -18,28 +18,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim import checks, config_file
-from sbs_sim.aircraft_values import Place, mirrored, places, replaced, separate, value_at
+from sbs_sim.aircraft_values import Place, check_path, mirrored, places, replaced, separate, value_at
 from sbs_sim.content import ByContent
 from sbs_sim.errors import AircraftError, AirfoilError
 from sbs_sim.model import params as P
-from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells, read_table
+from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells, read_table, stall_angles
 from sbs_sim.model.frames import hub_axes
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES, StateLayout
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
-NOT_PHYSICS = ("name", "airfoil", "collective_range", "cyclic_range", "swashplate_rate")  # of a rotor, for the model
+# Of a rotor and of the air, for the model.
+NOT_PHYSICS = ("name", "airfoil", "collective_range", "cyclic_range", "swashplate_rate", "speed_of_sound")
 MOST_TOLD = 5  # changes that a refusal names
 LEAST_DENSITY = 1e-12  # kg/m^3, less than at 300 km: a vacuum
 
 
 @dataclass(frozen=True)
 class Environment:
-    """Air and gravity: density [kg/m^3], kinematic viscosity [m^2/s], gravity [m/s^2]."""
+    """Air and gravity: density [kg/m^3], kinematic viscosity [m^2/s], gravity [m/s^2], speed of sound [m/s].
+
+    The speed of sound is for Mach numbers that are told; the model has none.
+    """
 
     air_density: float
     kinematic_viscosity: float
     gravity: float
+    speed_of_sound: float = 340.3  # ISO 2533, standard atmosphere, at sea level
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,6 +280,7 @@ class Aircraft(ByContent):
             A path that does not exist, or a value with which the aircraft is not possible: one line that names path,
             value and what is allowed.
         """
+        check_path(path)
         return self.with_values({path: value})
 
     def with_values(self, values: Mapping[str, Any]) -> "Aircraft":
@@ -390,6 +396,18 @@ class Aircraft(ByContent):
         """
         choices = [lead_lag, cyclic_inflow, self.options.coupling == "complete", self.options.hub_moment == "complete"]
         return self._params._replace(switches=np.array(choices, dtype=np.int64))
+
+    @cached_property
+    def stall_table(self) -> Array:
+        """Reynolds numbers and stall angles of every rotor as `working_state` takes them, shape (n_rotors, 3, n)."""
+        tables = [self.airfoils[rotor.airfoil] for rotor in self.rotors]
+        size = max(len(table.reynolds) for table in tables)
+        return np.array(
+            [
+                np.pad((table.reynolds, *stall_angles(table)), ((0, 0), (0, size - len(table.reynolds))), "edge")
+                for table in tables
+            ]
+        )
 
     @cached_property
     def _params(self) -> P.Params:

@@ -21,6 +21,7 @@ UNITS = {
     **dict.fromkeys(("pitch_flap_coupling", "pitch_lag_coupling", "mixing"), "rad/rad"),
     "air_density": "kg/m^3",
     "kinematic_viscosity": "m^2/s",
+    "speed_of_sound": "m/s",
     "gravity": "m/s²",
     "inertia": "kg m^2",
     "flat_plate_areas": "m^2",
@@ -49,12 +50,16 @@ def places(data: Mapping[str, Any], schema: Mapping[str, Any], path: str) -> lis
     AircraftError
         There is no such place: the message names the part of the path and what is allowed.
     """
-    if not (isinstance(path, str) and path.isprintable() and PATH.fullmatch(path)):
-        raise AircraftError(
-            f"path = {checks.shown(path)}: allowed are keys like body.mass, rotors.radius, rotors[0].hub[2]"
-        )
+    check_path(path)
     steps = [int(step["index"]) if step["index"] else step["key"] for step in STEP.finditer(path)]
     return _walk(data, schema, steps, "")
+
+
+def check_path(path: Any) -> None:
+    """Raise AircraftError for what is no path of keys and indices."""
+    if not (isinstance(path, str) and path.isprintable() and PATH.fullmatch(path)):
+        allowed = "allowed are keys like body.mass, rotors.radius, rotors[0].hub[2]"
+        raise AircraftError(f"path = {checks.shown(path)}: {allowed}")
 
 
 def _walk(node: Any, schema: Mapping[str, Any], steps: Sequence[str | int], done: str) -> list[Place]:

@@ -79,6 +79,8 @@ class Batch(ByContent):
     errors : tuple of str or None
         Of each flight, why it ended early or did not begin, in one line; None for a whole flight. "cancelled" for
         what was not begun.
+    warnings : tuple of tuple of str
+        Of each flight, where the model does not hold and what actuators would not do, see `sbs_sim.simulation.History`.
     """
 
     cases: tuple[Case, ...]
@@ -86,6 +88,7 @@ class Batch(ByContent):
     state_names: tuple[str, ...]
     histories: dict[str, Array] = field(repr=False)
     errors: tuple[str | None, ...]
+    warnings: tuple[tuple[str, ...], ...]
 
     @cached_property
     def failed(self) -> tuple[int, ...]:
@@ -160,7 +163,7 @@ def simulate_batch(
         (n_flights, n_rows). The four loads and accelerations take a derivative for every row. Aircraft with fewer
         rotors or other states have NaN in their places.
     tick, **options
-        See `sbs_sim.simulate`: azimuth_step, lead_lag, cyclic_inflow, method, ground_altitude.
+        See `sbs_sim.simulate`: azimuth_step, lead_lag, cyclic_inflow, method, ground_altitude, actuators.
     workers : int, optional
         Number of threads, one for each core if not given. The results are the same for any number.
     progress : callable, optional
@@ -192,10 +195,11 @@ def simulate_batch(
     memory = checks.number("memory", memory, 0.0, 1e15, "bytes", BatchError)
     histories = _memory(cases, plan.outputs, rows, names, memory)
     errors: list[str | None] = [CANCELLED] * len(cases)
+    told: list[tuple[str, ...]] = [()] * len(cases)
     done = itertools.count(1)
 
-    def keep(i: int, result: tuple[dict[str, Array], str | None]) -> None:
-        flown, errors[i] = result
+    def keep(i: int, result: tuple[dict[str, Array], str | None, tuple[str, ...]]) -> None:
+        flown, errors[i], told[i] = result
         _fill(histories, i, flown, cases[i].aircraft.layout.names, names)
         if progress is not None:
             progress(i, next(done), len(cases))
@@ -203,7 +207,7 @@ def simulate_batch(
     calls = [(case.aircraft, case.start, case.controls, case.wind, dict(case.changes), plan) for case in cases]
     compute(_fly, calls, keep, workers=count, cancelled=cancelled, dask=dask)
     time = np.multiply(np.arange(rows) * plan.every, plan.options["tick"], dtype=float)
-    return Batch(tuple(cases), time, names, histories, tuple(errors))
+    return Batch(tuple(cases), time, names, histories, tuple(errors), tuple(told))
 
 
 def _plan(cases: Sequence[Case], duration: float, every: int, outputs: Sequence[str], options: dict[str, Any]) -> Plan:
@@ -212,7 +216,7 @@ def _plan(cases: Sequence[Case], duration: float, every: int, outputs: Sequence[
     duration = checks.number("duration", duration, 0.0, 1e6, "s", BatchError)
     options["tick"] = checks.number("tick", options["tick"], 1e-4, 1.0, "s", BatchError)
     every = checks.whole("every", every, 1, MOST_TICKS, BatchError)
-    allowed = ("tick", "azimuth_step", "method", "ground_altitude", *FIDELITY)
+    allowed = ("tick", "azimuth_step", "method", "ground_altitude", "actuators", *FIDELITY)
     unknown = [name for name in options if name not in allowed]
     if unknown:
         raise BatchError(f"{unknown[0]}: unknown option, allowed are {', '.join(allowed)}")
@@ -277,8 +281,8 @@ def _fly(
     wind: Wind,
     changes: dict[str, Any],
     plan: Plan,
-) -> tuple[dict[str, Array], str | None]:
-    """What is asked for of one flight, and its error."""
+) -> tuple[dict[str, Array], str | None, tuple[str, ...]]:
+    """What is asked for of one flight, its error, and its warnings."""
     try:
         layout = aircraft.layout
         if changes:
@@ -300,5 +304,6 @@ def _fly(
             aircraft, start, controls, plan.duration, every=plan.every, loaded=loaded, wind=wind, **plan.options
         )
     except SbsError as error:
-        return {}, str(error)
-    return {name: flown[name] for name in plan.outputs if name in flown}, str(fault) if fault else None
+        return {}, str(error), ()
+    kept = {name: flown[name] for name in plan.outputs if name in flown}
+    return kept, str(fault) if fault else None, flown.warnings

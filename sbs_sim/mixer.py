@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 # s; swashplates that rest at their target may use this much time at once when a new one comes: what an output is held
 # for at 100 Hz. More, and a rest would be a leave to jump; nothing, and every command would come one period late.
 REST_CREDIT = 0.01
+ROUNDING = 1e-12  # rad, that an angle may be beyond its limit
 
 
 class Mixer:
@@ -123,9 +124,26 @@ def check_controls(values: Array) -> None:
             checks.number(name, value, -math.pi / 2, math.pi / 2, "rad", SimulationError)
 
 
+def check_ranges(aircraft: Aircraft, values: Array, where: str = "") -> None:
+    """Raise SimulationError for pilot controls [rad], shape (4,), beyond their ranges, which `Mixer` would clip.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    values : ndarray, shape (4,)
+    where : str
+        What the message begins with.
+    """
+    for name, value in zip(CONTROL_NAMES, values, strict=True):
+        low, high = aircraft.control_ranges[name]
+        if not low - ROUNDING <= value <= high + ROUNDING:  # true for a NaN as well
+            limits = f"{low:.6g} to {high:.6g} rad ({math.degrees(low):g} to {math.degrees(high):g} deg)"
+            raise SimulationError(f"{where}{name} = {value:.6g}: allowed are {limits}")
+
+
 def _clipped(names: tuple[str, ...] | list[str], wanted: Array, limited: Array) -> list[str]:
     return [
         f"{name} at its limit of {math.degrees(limit):.6g} deg"
         for name, value, limit in zip(names, wanted, limited, strict=True)
-        if abs(value - limit) > 1e-12
+        if abs(value - limit) > ROUNDING
     ]

@@ -1,6 +1,7 @@
 """Independent calls side by side: in threads on the cores of this machine, or on the workers of a dask cluster."""
 
 import os
+import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from sbs_sim import checks
 from sbs_sim.errors import ClusterError, SbsError
+from sbs_sim.interruption import until
 
 if TYPE_CHECKING:
     import distributed
@@ -42,7 +44,7 @@ def compute(
     cancelled: Callable[[], bool] | None = None,
     dask: "str | distributed.Client | None" = None,
 ) -> None:
-    """Call a function with each of many arguments, in any order.
+    """Call a function with each of many arguments, in any order; an interruption (Ctrl-C) ends all of them soon.
 
     Parameters
     ----------
@@ -126,22 +128,30 @@ def _pool(workers: int, dask: "str | distributed.Client | None") -> AbstractCont
 
 @contextmanager
 def _threads(workers: int) -> Iterator["Threads"]:
-    executor = ThreadPoolExecutor(workers, thread_name_prefix="sbs_sim")
+    executor, stop = ThreadPoolExecutor(workers, thread_name_prefix="sbs_sim"), threading.Event()
     try:
-        yield Threads(executor)
+        yield Threads(executor, stop)
     finally:
+        stop.set()  # what is still at work then was interrupted
         executor.shutdown(cancel_futures=True)
 
 
 class Threads:
-    """Threads of this process: compiled code does not hold the lock that they share."""
+    """Threads of this process: compiled code does not hold the lock that they share.
 
-    def __init__(self, executor: ThreadPoolExecutor) -> None:
-        self._executor = executor
+    Parameters
+    ----------
+    executor : ThreadPoolExecutor
+    stop : threading.Event
+        Set when nobody waits for the calls any more; those at work end where they look next.
+    """
+
+    def __init__(self, executor: ThreadPoolExecutor, stop: threading.Event) -> None:
+        self._executor, self._stop = executor, stop
 
     def submit(self, function: Callable[..., Any], aircraft: "Aircraft", *arguments: Any) -> Future[Any]:
         """Begin a call when a thread is free."""
-        return self._executor.submit(function, aircraft, *arguments)
+        return self._executor.submit(until, self._stop, function, aircraft, *arguments)
 
     def result(self, future: Future[Any]) -> Any:
         """What a call has given, or raised."""

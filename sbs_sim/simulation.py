@@ -5,36 +5,39 @@ steps. Steps are counted in integers from the start, and time is step x dt, so t
 give the same flight to the last bit.
 """
 
+from __future__ import annotations  # so that `help` shows the names of types and not what they stand for
+
 import collections
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sbs_sim import checks
+from sbs_sim import checks, interruption
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint
 from sbs_sim.content import ByContent
 from sbs_sim.errors import SimulationError
-from sbs_sim.mixer import check_controls
+from sbs_sim.mixer import ROUNDING, Mixer, check_controls, check_ranges
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.fly import fly
-from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
+from sbs_sim.model.frames import euler_angles, euler_to_quaternion, rotation_matrix, to_body
 from sbs_sim.model.ground import lowest_point
 from sbs_sim.model.integrate import PARTITIONED, RK4, TSIT5, advance
-from sbs_sim.model.kernel import Address
+from sbs_sim.model.kernel import address
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.wind import Wind, WindField, wind_at
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
-from sbs_sim.validity import stall_table
+from sbs_sim.validity import flight_warnings
 
 Array = NDArray[np.float64]
 Commands = ArrayLike | Callable[[float], ArrayLike]
+Command = Callable[[int, float], Array]  # of a tick, and its time [s]
 
 UNIT = 1e-9  # a quaternion whose norm is this near to one is a unit quaternion
 METHODS = {"rk4": RK4, "tsit5": TSIT5, "partitioned": PARTITIONED}
@@ -44,7 +47,10 @@ AZIMUTH_STEPS = (math.radians(0.01), math.radians(45.0))  # rad
 # A tick is one uninterrupted call of compiled code; this many steps take it a tenth of a second.
 MOST_STEPS_PER_TICK = 10_000
 MOST_WIND_TICKS = 1_000_000_000  # that turbulence is brought forward by for a log that begins in mid-flight: minutes
-BLOCK = 1000  # ticks that whole flights take in one call
+# Ticks that whole flights take in one call, and elements of blades in all steps of these: a tenth of a second, in which
+# no interruption is heard.
+BLOCK, BLOCK_ELEMENTS = 1000, 3_500_000
+WATCH_PERIOD = 0.1  # s of flight between looks whether the model holds
 
 # Beyond these magnitudes a state is not plausible and the simulation stops. The angles and the inflow are far outside
 # the validity of the model; the velocity is beyond the speed of sound.
@@ -111,7 +117,7 @@ class Rows(ByContent):
     loads: Array
     wind: Array
 
-    def first(self, count: int) -> "Rows":
+    def first(self, count: int) -> Rows:
         """The first instants."""
         return Rows(*(getattr(self, part.name)[:count] for part in fields(self)))
 
@@ -222,7 +228,8 @@ class Simulation:
         self._params = aircraft.params(lead_lag, cyclic_inflow)
         self._work = P.make_work(self._params)
         self._bounds = np.append(plausible_bounds(aircraft), -ground)
-        self._stall = stall_table(aircraft)
+        self._stall = aircraft.stall_table
+        self._watch = max(1, round(WATCH_PERIOD / tick))
         self._azimuth0 = np.zeros(len(aircraft.rotors))
         self._slope = np.zeros(self.layout.size)
         self.step = 0
@@ -386,7 +393,7 @@ class Simulation:
 
     def fly(
         self, swashplates: Array, ticks: int, every: int = 1, loaded: bool = True
-    ) -> tuple[Rows, SimulationError | None]:
+    ) -> tuple[Rows, Array, SimulationError | None]:
         """Fly many ticks in one call of compiled code, during which other threads go on.
 
         To the last bit it is what `set_swashplate`, `snapshot` and `advance` give tick by tick.
@@ -405,39 +412,49 @@ class Simulation:
         Returns
         -------
         rows : Rows
+        working : ndarray, shape (n, n_rotors, WORKING_SIZE)
+            Working states of the rotors, see `Snapshot`, once every tenth of a second.
         fault : SimulationError or None
             Why the flight ended before its last tick, see `advance`; it cannot go on then.
         """
         air = np.concatenate([self._air[np.newaxis], self._field.next_ticks(ticks)])
         begin = self.step // self.steps_per_tick
-        told = np.arange(-(-begin // every) * every - begin, len(swashplates), every)
+        told, watched = (np.arange(-(-begin // n) * n - begin, len(swashplates), n) for n in (every, self._watch))
         rows = self._rows((begin + told) * self.steps_per_tick, swashplates[told], air[told], loaded)
         x, first, options = self.state, swashplates[0], (self._method, self._bounds, self._work)
         start = (self._azimuth0, self.step, self.steps_per_tick, self.step_size)
+        row = np.zeros((len(self._azimuth0), WORKING_SIZE))
+        working = np.zeros((len(watched), *row.shape))
         machine_code = (
-            Address(advance, self._params, x, first, *start, air[0], *options),
-            Address(derivative, self._params, x, first, self._azimuth0, self._slope[:3], self._work, self._slope),
+            address(advance, self._params, x, first, *start, air[0], *options),
+            address(derivative, self._params, x, first, self._azimuth0, self._slope[:3], self._work, self._slope),
+            address(working_state, self._params, x, self._stall, self._work, row),
         )
-        offset = int(told[0]) if len(told) else len(swashplates)
+        offset, look = (int(places[0]) if len(places) else len(swashplates) for places in (told, watched))
         outputs = (rows.azimuth, rows.wind, rows.state, rows.acceleration, rows.loads, self._slope)
+        steps = (begin + watched) * self.steps_per_tick
+        looks = (
+            self._stall,
+            look,
+            self._watch,
+            self._azimuths(steps[:, np.newaxis]),
+            self._air_at(steps, air[watched]),
+        )
         self.step, culprit = fly(
             *(*machine_code, self._params, x, *start, *options),
-            *(swashplates, air, ticks, offset, every, loaded, *outputs),
+            *(swashplates, air, ticks, offset, every, loaded, *outputs, *looks, working),
         )
+        working = working[steps <= self.step]
         self._air, self.swashplate = air[ticks], swashplates[-1].copy()
         rows = rows.first(int(np.count_nonzero(rows.step <= self.step)))
         if loaded:
             for state, acceleration in zip(rows.state, rows.acceleration, strict=True):
                 acceleration += self._gravity(state)
-        return rows, self._end(culprit) if culprit >= 0 else None
+        return rows, working, self._end(culprit) if culprit >= 0 else None
 
     def _rows(self, steps: NDArray[np.int64], swashplates: Array, air: Array, loaded: bool) -> Rows:
         """Rows of which the flight fills in state, force and loads."""
         count, rotors = len(steps), len(self._azimuth0)
-        wind = np.zeros((count, 3))
-        if loaded:
-            for row, step, velocity in zip(air, steps, wind, strict=True):
-                wind_at(row, step * self.step_size, 0.0, velocity)
         return Rows(
             step=steps,
             time=np.multiply(steps, self.step_size, dtype=float),
@@ -446,16 +463,23 @@ class Simulation:
             swashplate=swashplates,
             azimuth=np.array([self._azimuths(step) for step in steps]).reshape(count, rotors),
             loads=np.zeros((count, rotors, P.LOAD_SIZE)),
-            wind=wind,
+            wind=self._air_at(steps, air) if loaded else np.zeros((count, 3)),
         )
+
+    def _air_at(self, steps: NDArray[np.int64], air: Array) -> Array:
+        """Velocity of the air at the beginnings of ticks, NED [m/s], shape (n, 3)."""
+        velocities = np.zeros((len(steps), 3))
+        for row, step, velocity in zip(air, steps, velocities, strict=True):
+            wind_at(row, step * self.step_size, 0.0, velocity)
+        return velocities
 
     def _gravity(self, state: Array) -> Array:
         """Gravity in body axes [m/s^2], shape (3,)."""
         down: Array = rotation_matrix(state[S.ATTITUDE : S.ATTITUDE + 4])[2]
         return down * self._params.air[P.GRAVITY]
 
-    def _azimuths(self, step: int) -> Array:
-        """Azimuth of every rotor at a step, shape (n_rotors,) [rad], 0 to 2 pi."""
+    def _azimuths(self, step: int | NDArray[np.int64]) -> Array:
+        """Azimuth of every rotor at a step, shape (n_rotors,) [rad], 0 to 2 pi; of steps (n, 1) shape (n, n_rotors)."""
         turned: Array = self._azimuth0 + self._params.rotor[:, P.SPEED] * self.step_size * step
         return turned % (2 * math.pi)
 
@@ -606,8 +630,15 @@ def trimmed_state(
     Raises
     ------
     SimulationError
-        The heading is not finite or far from a turn; position and velocity are checked by `Simulation`.
+        A trim of an aircraft with other rotors; a heading that is not finite or far from a turn. Position and velocity
+        are checked by `Simulation`.
     """
+    if point.state_names != aircraft.layout.linear_names:
+        own = ", ".join(str(rotor.blades) for rotor in aircraft.rotors)
+        raise SimulationError(
+            f"start: a trim with {len(point.state_names)} states: allowed is one of an aircraft with {own} blades, with"
+            f" {aircraft.layout.linear_size}"
+        )
     heading = checks.number("heading", heading, -4 * math.pi, 4 * math.pi, "rad", SimulationError)
     state = aircraft.layout.from_linear(point.state, heading)
     state[: S.ATTITUDE] = position
@@ -626,6 +657,29 @@ def blade_angles(aircraft: Aircraft, snapshot: Snapshot) -> list[tuple[Array, Ar
     return pairs
 
 
+class History(dict[str, Array]):
+    """Histories of a flight by name, see `simulate`.
+
+    Attributes
+    ----------
+    warnings : tuple of str
+        Where the model does not hold, and what the aircraft's actuators would not do, a line each; as `status` has
+        them of a live flight. Looked for ten times a second.
+    """
+
+    def __init__(self, histories: Mapping[str, Array], warnings: Iterable[str] = ()) -> None:
+        super().__init__(histories)
+        self.warnings = tuple(warnings)
+
+    def __missing__(self, name: str) -> Array:
+        raise KeyError(f"no {name!r}: there are {', '.join(self)}")
+
+    def __repr__(self) -> str:
+        time = self["time"]
+        told = f", {len(self.warnings)} warnings" if self.warnings else ""
+        return f"<flight of {time[-1] - time[0]:g} s, {len(time)} rows of {', '.join(self)}{told}>"
+
+
 def simulate(
     aircraft: Aircraft,
     start: TrimPoint | ArrayLike,
@@ -639,7 +693,8 @@ def simulate(
     method: str = "rk4",
     wind: Wind | None = None,
     ground_altitude: float = -math.inf,
-) -> Mapping[str, Array]:
+    actuators: bool = False,
+) -> History:
     """Fly for a while and return what happened.
 
     Parameters
@@ -654,24 +709,34 @@ def simulate(
         [s], rounded to whole ticks.
     tick, azimuth_step, lead_lag, cyclic_inflow, method, wind, ground_altitude
         See `Simulation`. A trim point is flown with the velocity of the steady wind added.
+    actuators : bool
+        False: controls must be within their ranges, and the swashplates follow them at once, as linear models have it;
+        steps that their actuators would not follow are told in `warnings`. True: the mixer of the live flight is
+        between them. It clips controls and angles to their ranges, which is told, and moves the swashplates at the
+        rates of their actuators.
 
     Returns
     -------
-    dict of str to ndarray
-        "time" (n,) [s], "controls" (n, 4), "swashplate" (n, n_rotors, 3) [rad], "acceleration" (n, 3), "thrust",
-        "torque", "power" (n, n_rotors), every name of the simulation state (n,), and "state" (n, size); n - 1 ticks.
+    History
+        Mapping of names to arrays, over the n instants between and at the ends of n - 1 ticks: "time" (n,) [s],
+        "controls" (n, 4), "swashplate" (n, n_rotors, 3) [rad], "acceleration" (n, 3) [m/s^2], "thrust" [N], "torque"
+        [N m], "power" [W] (n, n_rotors), "state" (n, size) and every name of the simulation state (n,), "phi", "theta",
+        "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed relative to the air [m/s]. `warnings` tells
+        where the model does not hold.
 
     Raises
     ------
     SimulationError
-        See `Simulation`.
+        See `Simulation`; controls beyond their ranges, naming control, time, value and range, or more rows of them than
+        ticks; the flight cannot go on.
     """
-    histories, fault = fly_commands(
+    flown, fault = fly_commands(
         aircraft,
         start,
         controls,
         duration,
         wind=wind,
+        actuators=actuators,
         tick=tick,
         azimuth_step=azimuth_step,
         lead_lag=lead_lag,
@@ -681,7 +746,7 @@ def simulate(
     )
     if fault is not None:
         raise fault
-    return histories
+    return flown
 
 
 def fly_commands(
@@ -693,24 +758,25 @@ def fly_commands(
     every: int = 1,
     loaded: bool = True,
     wind: Wind | None = None,
+    actuators: bool = False,
     **options: Any,
-) -> tuple[dict[str, Array], SimulationError | None]:
+) -> tuple[History, SimulationError | None]:
     """Fly as `simulate` does, as far as it goes.
 
     Parameters
     ----------
-    aircraft, start, controls, duration, wind
+    aircraft, start, controls, duration, wind, actuators
         See `simulate`.
     every : int
         Ticks from one row of the histories to the next.
     loaded : bool
-        False leaves "acceleration", "thrust", "torque" and "power" out.
+        False leaves "acceleration", "thrust", "torque", "power" and "V" out.
     **options :
         The others of `Simulation`.
 
     Returns
     -------
-    histories : dict of str to ndarray
+    histories : History
         See `simulate`; up to the last good tick.
     fault : SimulationError or None
         Why the flight ended early.
@@ -722,49 +788,124 @@ def fly_commands(
     """
     checks.instance("aircraft", aircraft, Aircraft, SimulationError)
     duration = checks.number("duration", duration, 0.0, 1e6, "s", SimulationError)
+    actuators = checks.flag("actuators", actuators, SimulationError)
     air = Wind() if wind is None else wind
     checks.instance("wind", air, Wind, SimulationError)
     state = trimmed_state(aircraft, start, wind=air.velocity) if isinstance(start, TrimPoint) else start
+    stand = start.swashplate if isinstance(start, TrimPoint) else None
     command = _command(controls)
-    simulation = Simulation(aircraft, state, aircraft.mix(command(0, 0.0)), wind=air, **options)
+    pilot = (_Mixed if actuators else _Direct)(aircraft, command, stand)
+    simulation = Simulation(aircraft, state, pilot.angles(command(0, 0.0), 0.0), wind=air, **options)
     ticks = round(duration / simulation.tick)
+    _check_rows(controls, ticks, simulation.tick)
     blocks: list[tuple[Rows, Array]] = []
+    looks: list[Array] = []
     fault: SimulationError | None = None
-    for begin in range(0, ticks + 1, BLOCK):
-        end = min(begin + BLOCK, ticks + 1)
-        given, angles, wrong = _angles(simulation, command, begin, end)
+    size = _block(simulation)
+    for begin in range(0, ticks + 1, size):
+        interruption.look()
+        end = min(begin + size, ticks + 1)
+        given, angles, wrong = _angles(simulation, pilot, begin, end)
         if len(angles):
-            rows, fault = simulation.fly(angles, min(len(angles), ticks - begin), every, loaded)
+            rows, working, fault = simulation.fly(angles, min(len(angles), ticks - begin), every, loaded)
             blocks.append((rows, given[rows.step // simulation.steps_per_tick - begin]))
+            looks.append(working)
         fault = fault or wrong
         if fault is not None:
             break
     if not blocks and fault is not None:
         raise fault
-    return _histories(aircraft, blocks, loaded), fault
+    told = (*flight_warnings(aircraft, np.concatenate(looks)), *pilot.told(simulation.tick))
+    return History(_histories(aircraft, blocks, loaded), told), fault
+
+
+def _block(simulation: Simulation) -> int:
+    """Ticks of a call that takes no longer than an interruption may wait."""
+    elements = simulation.aircraft.layout.blade_count * simulation.aircraft.options.elements
+    return max(1, min(BLOCK, BLOCK_ELEMENTS // (simulation.steps_per_tick * elements)))
+
+
+class _Direct:
+    """Swashplates that follow the controls at once.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    command : callable
+        Controls of tick i at a time.
+    stand : ndarray, shape (n_rotors, 3), or None
+        Where the swashplates stand before; None where nobody knows.
+    """
+
+    def __init__(self, aircraft: Aircraft, command: Command, stand: Array | None) -> None:
+        self.command, self._aircraft = command, aircraft
+        self._before, self._largest = stand, np.zeros((len(aircraft.rotors), len(S.SWASHPLATE_NAMES)))
+        self._given, self._angles = b"", np.empty(0)
+
+    def angles(self, controls: Array, time: float) -> Array:
+        """Swashplate angles [rad] that controls [rad] give at a time [s], shape (n_rotors, 3)."""
+        if controls.tobytes() == self._given:
+            return self._angles
+        check_ranges(self._aircraft, controls, f"controls at {time:g} s: ")
+        angles = self._aircraft.mix(controls)
+        if self._before is not None:
+            self._largest = np.maximum(self._largest, np.abs(angles - self._before))
+        self._given, self._angles, self._before = controls.tobytes(), angles, angles
+        return angles
+
+    def told(self, tick: float) -> Iterator[str]:
+        """What the actuators would not have done, with ticks of this length [s]."""
+        for rotor, row in zip(self._aircraft.rotors, self._largest, strict=True):
+            for name, step in zip(S.SWASHPLATE_NAMES, row, strict=True):
+                if step > rotor.swashplate_rate * tick + ROUNDING:
+                    rate = f"{math.degrees(rotor.swashplate_rate):g} deg/s"
+                    yield f"{rotor.name}: {name} is moved faster than its actuator moves, {rate}"
+
+
+class _Mixed:
+    """Swashplates that the mixer moves; see `_Direct`."""
+
+    def __init__(self, aircraft: Aircraft, command: Command, stand: Array | None) -> None:
+        self.command, self._mixer = command, Mixer(aircraft)
+        self._clipped: dict[str, None] = {}
+        if stand is not None:
+            self._mixer.stand(stand)
+
+    def angles(self, controls: Array, time: float) -> Array:
+        """Swashplate angles [rad] at a time [s], shape (n_rotors, 3), on the way to what controls [rad] want."""
+        self._mixer.set_target(controls)
+        self._clipped |= dict.fromkeys(self._mixer.saturated)
+        return self._mixer.move(time)
+
+    def told(self, _: float) -> Iterator[str]:
+        """What was clipped."""
+        return (f"clipped: {text}" for text in self._clipped)
 
 
 def _angles(
-    simulation: Simulation, command: Callable[[int, float], Array], begin: int, end: int
+    simulation: Simulation, pilot: _Direct | _Mixed, begin: int, end: int
 ) -> tuple[Array, Array, SimulationError | None]:
     """Controls and swashplate angles of ticks, up to the first that are out of range, and what is wrong with those."""
     given: list[Array] = []
     angles: list[Array] = []
     wrong: SimulationError | None = None
+    last: Array | None = None
     for i in range(begin, end):
+        time = i * simulation.steps_per_tick * simulation.step_size
         try:
-            controls = command(i, i * simulation.steps_per_tick * simulation.step_size)
-            if not given or controls.tobytes() != given[-1].tobytes():
-                checked = simulation.checked_swashplate(simulation.aircraft.mix(controls))
+            controls = pilot.command(i, time)
+            wanted = pilot.angles(controls, time)
+            checked = angles[-1] if wanted is last else simulation.checked_swashplate(wanted)
         except SimulationError as error:
             wrong = error
             break
+        last = wanted
         given.append(controls)
         angles.append(checked)
     return np.array(given), np.array(angles), wrong
 
 
-def _command(controls: Commands) -> Callable[[int, float], Array]:
+def _command(controls: Commands) -> Command:
     """Controls of tick i at a time, whatever way they were given."""
     if callable(controls):
         function = controls
@@ -781,6 +922,15 @@ def _command(controls: Commands) -> Callable[[int, float], Array]:
     return lambda i, _: rows[min(i, len(rows) - 1)]
 
 
+def _check_rows(controls: Commands, ticks: int, tick: float) -> None:
+    """Raise SimulationError for rows of controls that would not be flown."""
+    if not callable(controls) and np.ndim(controls) == 2 and len(np.asarray(controls)) > ticks + 1:
+        rows = len(np.asarray(controls))
+        raise SimulationError(
+            f"controls have {rows} rows: allowed are up to {ticks + 1}, one for each tick of {tick:g} s and the end"
+        )
+
+
 def _four(values: ArrayLike) -> Array:
     array = checks.array("controls", values, SimulationError)
     if array.shape != (len(S.CONTROL_NAMES),):
@@ -789,15 +939,20 @@ def _four(values: ArrayLike) -> Array:
     return array
 
 
-def histories(aircraft: Aircraft, snapshots: Sequence[Snapshot], given: Sequence[Array]) -> dict[str, Array]:
-    """Arrays by name, see `simulate`, of as many snapshots as pilot controls [rad], each shape (4,)."""
+def history(
+    aircraft: Aircraft, snapshots: Sequence[Snapshot], given: Sequence[Array], warnings: Iterable[str] = ()
+) -> History:
+    """History, see `simulate`, of as many snapshots as pilot controls [rad], each shape (4,), with further warnings."""
     rows = Rows(**{field.name: np.array([getattr(one, field.name) for one in snapshots]) for field in fields(Rows)})
-    return _histories(aircraft, [(rows, np.array(given))], True)
+    working = np.array([one.working for one in snapshots if one.working is not None])
+    told = (*flight_warnings(aircraft, working), *warnings)
+    return History(_histories(aircraft, [(rows, np.array(given))], True), told)
 
 
 def _histories(aircraft: Aircraft, blocks: Sequence[tuple[Rows, Array]], loaded: bool) -> dict[str, Array]:
     states = np.concatenate([rows.state for rows, _ in blocks])
     named = {name: states[:, i] for i, name in enumerate(aircraft.layout.names)}
+    named |= dict(zip(S.EULER_NAMES, euler_angles(states[:, S.ATTITUDE : S.VELOCITY]).T, strict=True))
     flown = named | {
         "time": np.concatenate([rows.time for rows, _ in blocks]),
         "state": states,
@@ -807,10 +962,13 @@ def _histories(aircraft: Aircraft, blocks: Sequence[tuple[Rows, Array]], loaded:
     if not loaded:
         return flown
     loads = np.concatenate([rows.loads for rows, _ in blocks])
+    wind = np.concatenate([rows.wind for rows, _ in blocks])
+    attitude, velocity = states[:, S.ATTITUDE : S.VELOCITY], states[:, S.VELOCITY : S.RATES]
     speeds = np.array([rotor.speed for rotor in aircraft.rotors])
     return flown | {
         "acceleration": np.concatenate([rows.acceleration for rows, _ in blocks]),
         "thrust": loads[:, :, P.THRUST],
         "torque": loads[:, :, P.TORQUE],
         "power": loads[:, :, P.TORQUE] * speeds,
+        S.AIRSPEED: np.linalg.norm(velocity - to_body(attitude, wind), axis=1),
     }

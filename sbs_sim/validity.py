@@ -1,14 +1,14 @@
 """Where the model is outside what it describes, in words (theory.md section 6.1)."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft import Aircraft, Rotor
 from sbs_sim.model import working_state as W
-from sbs_sim.model.airfoil import stall_angles
 
 Array = NDArray[np.float64]
 
@@ -18,6 +18,11 @@ LARGEST_STALLED = 0.1  # of the disc; the sections know nothing of dynamic stall
 LARGEST_REVERSED = (
     0.1  # of the disc; reached at an advance ratio of 0.63, where the circle of reverse flow has mu^2 / 4
 )
+# Airfoil tables have no Mach number. By the rule of Prandtl and Glauert (J. D. Anderson: Fundamentals of aerodynamics,
+# section 11.4) a section lifts 1 / sqrt(1 - M^2) of what it does in incompressible flow: 11 % more at this one.
+LARGEST_TIP_MACH = 0.44
+INCOMPRESSIBLE = "where incompressible section data do not hold"
+LARGEST_OUTSIDE = 0.1  # of the disc, with Reynolds numbers that the airfoil's table does not have
 # Momentum theory in descent, in hover inflow velocities: the vortex ring state begins and ends where the motion of a
 # helicopter in it becomes unstable, W. Johnson: Model for vortex ring state influence on rotorcraft flight dynamics,
 # NASA/TP-2005-213477; up to twice the hover inflow there is no stream tube, J. G. Leishman: Principles of helicopter
@@ -47,9 +52,9 @@ class WorkingState:
     descent_ratio : float
         Velocity of the hub against the thrust, relative to the air, over the hover inflow velocity of the present
         thrust; negative in a climb, zero if the rotor is unloaded.
-    stalled_share, reversed_share : float
-        Of the disc between flap hinge and tip: where sections are stalled, and where the flow comes from behind; as the
-        blades meet it at this instant.
+    stalled_share, reversed_share, outside_share : float
+        Of the disc between flap hinge and tip: where sections are stalled, where the flow comes from behind, and where
+        the Reynolds number is not in the airfoil's table; as the blades meet it at this instant.
     inflow_state : str
         One of `INFLOW_STATES`.
     """
@@ -58,19 +63,8 @@ class WorkingState:
     descent_ratio: float
     stalled_share: float
     reversed_share: float
+    outside_share: float
     inflow_state: str
-
-
-def stall_table(aircraft: Aircraft) -> Array:
-    """Reynolds numbers and stall angles of every rotor as `working_state` takes them, shape (n_rotors, 3, n)."""
-    tables = [aircraft.airfoils[rotor.airfoil] for rotor in aircraft.rotors]
-    size = max(len(table.reynolds) for table in tables)
-    return np.array(
-        [
-            np.pad((table.reynolds, *stall_angles(table)), ((0, 0), (0, size - len(table.reynolds))), "edge")
-            for table in tables
-        ]
-    )
 
 
 def working_state(row: Array) -> WorkingState:
@@ -86,7 +80,28 @@ def working_state(row: Array) -> WorkingState:
     descent = float(row[W.DESCENT]) / hover if loaded else 0.0
     edgewise = float(row[W.ADVANCE_RATIO]) / hover if loaded else 0.0
     state = inflow_state(descent, edgewise, float(row[W.FLOW]) >= 0.0) if loaded else UNLOADED
-    return WorkingState(float(row[W.ADVANCE_RATIO]), descent, float(row[W.STALLED]), float(row[W.REVERSED]), state)
+    return WorkingState(
+        advance_ratio=float(row[W.ADVANCE_RATIO]),
+        descent_ratio=descent,
+        stalled_share=float(row[W.STALLED]),
+        reversed_share=float(row[W.REVERSED]),
+        outside_share=float(row[W.OUTSIDE]),
+        inflow_state=state,
+    )
+
+
+def tip_mach(aircraft: Aircraft, rotor: Rotor, row: Array) -> float:
+    """Mach number of the advancing tip: tip speed and velocity along the disc over the speed of sound.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    rotor : Rotor
+    row : ndarray, shape (WORKING_SIZE,)
+        Of `sbs_sim.model.working_state`.
+    """
+    advancing = rotor.speed * rotor.radius * (1.0 + float(row[W.ADVANCE_RATIO]))
+    return advancing / aircraft.environment.speed_of_sound
 
 
 def inflow_state(descent: float, edgewise: float, with_thrust: bool) -> str:
@@ -135,4 +150,23 @@ def warnings(aircraft: Aircraft, rows: Array) -> list[str]:
             found.append(f"{rotor.name}: stall on more than {LARGEST_STALLED:.0%} of the disc, without its dynamics")
         if state.reversed_share > LARGEST_REVERSED:
             found.append(f"{rotor.name}: reverse flow on more than {LARGEST_REVERSED:.0%} of the disc")
+        if tip_mach(aircraft, rotor, row) > LARGEST_TIP_MACH:
+            found.append(f"{rotor.name}: tip Mach number above {LARGEST_TIP_MACH:g}, {INCOMPRESSIBLE}")
+        if state.outside_share > LARGEST_OUTSIDE:
+            low, *_, high = aircraft.airfoils[rotor.airfoil].reynolds
+            table = f"{low:g} to {high:g}, those of the airfoil table,"
+            found.append(
+                f"{rotor.name}: Reynolds number outside {table} on more than {LARGEST_OUTSIDE:.0%} of the disc"
+            )
     return found
+
+
+def flight_warnings(aircraft: Aircraft, working: Array) -> Iterator[str]:
+    """What is outside the validity of the model at some instants, each line once, in the order in which they begin.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    working : ndarray, shape (n, n_rotors, WORKING_SIZE)
+    """
+    return iter(dict.fromkeys(line for rows in working for line in warnings(aircraft, rows)))

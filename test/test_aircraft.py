@@ -271,7 +271,7 @@ OTHER_VALUES = {
     ("options", "elements"): 21,
 }
 NOT_IN_THE_MODEL = {"name", "description", "controls", "mixing", "collective_range_deg", "cyclic_range_deg"}
-NOT_IN_THE_MODEL |= {"swashplate_rate_deg"}
+NOT_IN_THE_MODEL |= {"swashplate_rate_deg", "speed_of_sound"}
 
 
 def leaf_id(path):
@@ -353,14 +353,15 @@ def test_the_schema_has_a_key_for_every_field_of_a_rotor():
     assert named == keys
 
 
-def test_every_key_is_demanded_but_the_description_and_factors_of_mixing():
+def test_every_key_is_demanded_but_the_description_factors_of_mixing_and_the_speed_of_sound():
     for path in LEAVES:
-        if path == ("description",) or "mixing" in path:
+        if path in (("description",), ("environment", "speed_of_sound")) or "mixing" in path:
             continue
         data = sbs_data()
         del get(data, path[:-1])[path[-1]]
         assert refusal(data) == f"{leaf_id(path).replace('.0.', '[0].')}: missing key"
     assert Aircraft.from_dict(without("description")).description == ""
+    assert Aircraft.from_dict(without("environment", "speed_of_sound")).environment.speed_of_sound == 340.3
 
 
 # -- what is refused, and how it is said ------------------------------------------------------------

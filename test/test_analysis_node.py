@@ -4,6 +4,7 @@ import math
 import os
 import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
@@ -12,14 +13,16 @@ import pytest
 rclpy = pytest.importorskip("rclpy")
 
 from action_msgs.msg import GoalStatus  # noqa: E402
-from ros_harness import DOMAINS, Client, world  # noqa: E402
+from ros_harness import DOMAINS, PATIENCE, Client, world  # noqa: E402
 
 from sbs_msgs.action import Sweep  # noqa: E402
 from sbs_msgs.msg import BodyState, LinearModel, SimulationStatus, TrimPoint  # noqa: E402
 from sbs_msgs.srv import Linearize, Trim  # noqa: E402
 from sbs_sim import Aircraft, Simulation, linearize, trim  # noqa: E402
+from sbs_sim.analysis.trim import TrimCondition  # noqa: E402
 from sbs_sim.flight_loop import FlightLoop  # noqa: E402
 from sbs_sim.model import state as S  # noqa: E402
+from sbs_sim.nodes.remote_pilot import RemotePilot, _paragraphs  # noqa: E402
 from sbs_sim.simulation import trimmed_state  # noqa: E402
 
 LONG = [0.02 * i for i in range(1000)]  # values of a sweep of half a minute, and more where others are busy
@@ -75,6 +78,7 @@ def check_trim(message, point):
     assert message.thrust == point.thrust.sum()
     assert message.power == point.power.sum()
     assert tuple(message.beyond_limits) == point.beyond_limits
+    assert tuple(message.warnings) == point.warnings
     by_name = dict(zip(point.state_names, point.state, strict=True))
     for j, (rotor, inflow) in enumerate(zip(message.rotors, message.inflow, strict=True), 1):
         np.testing.assert_array_equal(rotor.flap, [by_name[f"{name}({j})"] for name in ("a0", "a1", "b1")])
@@ -137,6 +141,49 @@ def test_the_forces_of_a_trimmed_hover_carry_the_weight(client):
     for rotor in found.rotors:
         # what the hub takes of the thrust is left when it has carried its blades
         assert rotor.hub.force.z == pytest.approx(-rotor.thrust + 3 * 0.1613 * 9.80665, rel=1e-3)
+
+
+def test_answers_tell_where_the_model_does_not_hold(client):
+    ring = [f"{name}: vortex ring state, where momentum theory does not hold" for name in ("MR1", "MR2")]
+    found = client.call(Trim, "trim", climb_rate=-7.0)
+    assert found.warnings == found.trim.warnings == ring
+    found = client.call(Linearize, "linearize", climb_rate=-7.0)
+    assert found.warnings == found.model.warnings == found.model.trim.warnings == ring
+    goal = client.send_goal(Sweep, "sweep", parameter="climb_rate", values=[0.0, -7.0], linear=False)
+    _, result = goal.end()
+    assert [point.warnings for point in result.points] == [[], ring]
+    assert sorted(feedback.last_warnings for feedback in goal.feedback) == [[], ring]
+    assert client.call(Trim, "trim").warnings == client.call(Linearize, "linearize").warnings == []
+
+
+def test_the_cockpit_shows_it_with_what_it_asks_for(flight, client):
+    """As text: nothing that came in a message is markup."""
+    page, done = Client(flight.domain, "page"), threading.Event()
+    pilot = RemotePilot(page.node)
+
+    def serve():
+        while not done.is_set():
+            page.spin(0.05)
+
+    server = threading.Thread(target=serve)
+    server.start()
+    try:
+        end = time.monotonic() + PATIENCE
+        while "no answer" in pilot.trim(TrimCondition())[1] or "no answer" in pilot.linearize(TrimCondition())[1]:
+            assert time.monotonic() < end
+            time.sleep(0.05)  # the services have not been discovered yet
+        told = [ask(TrimCondition(0.0, -7.0)) for ask in (pilot.trim, pilot.linearize)]
+    finally:
+        done.set()
+        server.join()
+        page.close()
+    for is_done, text in told:
+        assert is_done, text
+        assert "outside the model&#39;s validity: MR1: vortex ring state, where momentum theory" in text
+        assert text.count("validity") == 2
+    assert _paragraphs(["a <b>*c*</b> _d_ [e](f)"]) == (
+        "\na &#60;b&#62;&#42;c&#42;&#60;&#47;b&#62; &#95;d&#95; &#91;e&#93;&#40;f&#41;\n"
+    )
 
 
 def test_a_trim_beyond_the_limits_is_told(client):

@@ -165,7 +165,8 @@ def test_a_flight_that_fails_ends_with_its_reason_and_disturbs_no_other(sbs, cas
         ({"workers": 0}, "workers = 0: allowed are whole numbers from 1 to 256"),
         (
             {"speed": 1},
-            "speed: unknown option, allowed are tick, azimuth_step, method, ground_altitude, lead_lag, cyclic_inflow",
+            "speed: unknown option, allowed are tick, azimuth_step, method, ground_altitude, actuators, lead_lag,"
+            " cyclic_inflow",
         ),
         ({"workers": 2, "dask": "x"}, "workers = 2: not allowed with dask, whose workers are those of the cluster"),
         ({"duration": 1e6}, "the histories of 1 flights with 100000001 rows take "),

@@ -313,6 +313,10 @@ def end_of_cockpit(*arguments, domain=0):
         (["--host", ""], "--host is empty"),
         (["--fly"], "--fly"),
         (["--logs"], "--logs: expected one argument"),
+        (
+            ["--attach", "--ros-args", "-p", "airspeed:=9.0"],
+            "-p: parameters are those of a simulator: not allowed with",
+        ),
     ],
 )
 def test_a_wrong_command_line_is_told(arguments, told):

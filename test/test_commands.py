@@ -110,6 +110,20 @@ def test_trim_names_what_is_beyond_its_limits():
     assert "beyond its limits: collective = 8.545 deg: allowed are 0 to 8 deg\n" in text
 
 
+def test_commands_say_where_the_model_does_not_hold(tmp_path):
+    """A descent into the rotors' own wake."""
+    line = "outside the model's validity: MR1: vortex ring state, where momentum theory does not hold\n"
+    file = tmp_path / "a.json"
+    for name, *arguments in (["trim"], ["linearize"]):
+        assert line in output(name, *arguments, "--climb-rate", -7, "--json", file)
+        assert "vortex ring" in json.loads(file.read_text())["warnings"][0]
+        assert "validity" not in output(name, *arguments)
+    text = output("sweep", "climb_rate", "--values", -7, 0, "--trims-only", "--csv", tmp_path / "a.csv")
+    assert text.count("validity") == 1
+    assert re.search(r"^climb_rate -7: outside the model's validity: MR1: vortex ring state, .*; MR2: ", text, re.M)
+    assert [bool(line["warnings"]) for line in csv.DictReader((tmp_path / "a.csv").open())] == [True, False]
+
+
 def test_trim_of_a_file_with_unequal_rotors():
     file = Path(__file__).resolve().parent / "data" / "tandem.yaml"
     text = output("trim", "--aircraft", file)
@@ -274,6 +288,8 @@ MISUSES = {
     "delay": ("gusts", "--delay", "101"),
     "no time": ("gusts", "--duration", "0.5"),
     "angle in radians": ("sweep", "sideslip", "0", "1", "2"),
+    "swept and given": ("sweep", "airspeed", "0", "5", "2", "--airspeed", "0"),
+    "angle swept and given": ("sweep", "sideslip_deg", "0", "5", "2", "--sideslip-deg", "1"),
 }
 
 

@@ -1,11 +1,14 @@
 """The edges of the model: what it says of itself there, that it stays finite, and that it comes back; the ground."""
 
+import csv
 import math
 
 import numpy as np
 import pytest
+from helpers import aircraft_data
 
-from sbs_sim import Simulation, simulate
+from sbs_sim import Aircraft, Case, Simulation, linearize, simulate, simulate_batch, sweep, trim
+from sbs_sim.analysis.export import sweep_to_csv
 from sbs_sim.errors import SimulationError
 from sbs_sim.model import state as S
 from sbs_sim.model import working_state as W
@@ -20,6 +23,7 @@ from sbs_sim.validity import (
     VORTEX_RING,
     WINDMILL,
     inflow_state,
+    tip_mach,
     warnings,
     working_state,
 )
@@ -170,6 +174,98 @@ def test_air_drives_a_rotor_in_the_windmill_state(sbs, hover):
     *_, last = held(simulation, 2.0)
     assert [state.inflow_state for state in states(last)] == [WINDMILL, WINDMILL]
     assert (last.loads[:, 1] < 0.0).all()  # torque: the shaft has to be held back
+
+
+# --- results say it too -----------------------------------------------------------------------------------------
+
+
+RING = [f"{name}: vortex ring state, where momentum theory does not hold" for name in ("MR1", "MR2")]
+WAKE = [line.replace("vortex ring", "turbulent wake") for line in RING]
+MACH = [f"{name}: tip Mach number above 0.44, where incompressible section data do not hold" for name in ("MR1", "MR2")]
+
+
+def test_trims_and_all_that_stands_on_them_say_where_the_model_does_not_hold(sbs, hover):
+    """-7 m/s is about one hover inflow velocity down: the middle of the ring; -20 m/s is behind it."""
+    assert hover.warnings == linearize(sbs, point=hover).warnings == ()
+    ring, wake = trim(sbs, climb_rate=-7.0), trim(sbs, climb_rate=-20.0)
+    assert list(ring.warnings) == RING
+    assert list(wake.warnings) == WAKE
+    model = linearize(sbs, point=wake)
+    assert list(model.warnings) == WAKE
+    assert wake.to_dict()["warnings"] == model.to_dict()["warnings"] == model.to_dict()["trim"]["warnings"] == WAKE
+    found = sweep(sbs, "climb_rate", [0.0, -7.0, -60.0], linear=False)
+    assert found.warnings == ((), tuple(RING), ())
+    assert [point["warnings"] for point in found.to_dict()["points"]] == [[], RING, []]
+    rows = list(csv.DictReader(sweep_to_csv(found).splitlines()))
+    assert [row["warnings"] for row in rows] == ["", "; ".join(RING), ""]
+
+
+def test_trims_by_the_two_loops_say_it_too(sbs):
+    assert list(trim(sbs.with_value("rotors.speed_rpm", 2900.0), method="two_loop").warnings) == MACH
+
+
+def test_a_flight_says_where_the_model_did_not_hold(sbs, hover):
+    """Each line once, though it is looked for ten times a second; the air comes from below for 0.4 s."""
+    assert simulate(sbs, hover, hover.controls, 0.3).warnings == ()
+    gust = Wind(gust=(0.0, 0.0, -10.0), gust_delay=0.5, gust_duration=0.4)
+    assert simulate(sbs, hover, hover.controls, 0.4, wind=gust).warnings == ()
+    assert list(simulate(sbs, hover, hover.controls, 1.0, wind=gust).warnings) == RING
+    assert list(simulate(sbs, hover, hover.controls, 1.0, wind=gust, tick=0.002, method="tsit5").warnings) == RING
+    cases = [Case(sbs, hover), Case(sbs, hover, wind=gust), Case(sbs, {"airspeed": 900.0})]
+    batch = simulate_batch(cases, 1.0, every=50, outputs=["u"])
+    assert batch.warnings == ((), tuple(RING), ())
+
+
+def test_looking_changes_no_bit(sbs, hover):
+    """Ticks one by one, without a look, and 2000 of them in blocks with one every tenth."""
+    wind = Wind(turbulence_intensity=(1.0, 1.0, 1.0), turbulence_seed=2)
+    flight = simulate(sbs, hover, hover.controls, 2.0, tick=0.001, wind=wind)
+    simulation = hovering(sbs, hover, tick=0.001, wind=wind)
+    for row in flight["state"][1:]:
+        simulation.advance()
+        assert simulation.state.tobytes() == row.tobytes()
+
+
+@pytest.mark.parametrize(("rpm", "told"), [(2700.0, []), (2900.0, MACH), (4000.0, MACH)])
+def test_mach_numbers_that_the_sections_do_not_have_are_told(sbs, rpm, told):
+    """0.44 times 340.3 m/s is 149.7 m/s: the tips of 0.505 m go faster from 2831 rpm on."""
+    fast = sbs.with_value("rotors.speed_rpm", rpm)
+    point = trim(fast)
+    assert [line for line in point.warnings if "Mach" in line] == told
+    snapshot = hovering(fast, point).snapshot()
+    assert [line for line in warnings(fast, snapshot.working) if "Mach" in line] == told
+    expected = rpm * math.pi / 30 * 0.505 / 340.3
+    for rotor, row in zip(fast.rotors, snapshot.working, strict=True):
+        assert tip_mach(fast, rotor, row) == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_advancing_tip_and_the_speed_of_sound_count(sbs):
+    point = trim(sbs, airspeed=15.0)
+    tip = (2400 * math.pi / 30 * 0.505 + 15.0 * math.cos(point.pitch)) / 340.3
+    assert [state.advance_ratio > 0.1 for state in states(hovering(sbs, point).snapshot())] == [True, True]
+    row = hovering(sbs, point).snapshot().working[0]
+    assert tip_mach(sbs, sbs.rotors[0], row) == pytest.approx(tip, rel=1e-6)
+    cold = sbs.with_value("environment.speed_of_sound", 320.0)
+    assert cold.parameter_hash == sbs.parameter_hash  # it changes nothing else
+    assert trim(sbs, airspeed=15.0).warnings == ()
+    assert list(trim(cold, airspeed=15.0).warnings) == MACH
+    data = aircraft_data()
+    del data["environment"]["speed_of_sound"]
+    assert Aircraft.from_dict(data).environment.speed_of_sound == 340.3
+
+
+def test_reynolds_numbers_that_the_table_does_not_have_are_told(sbs):
+    """In air that is ten times as viscous all sections are below 50000; in one of four times those up to 57.3 m/s.
+
+    Those lie within 0.228 m, which is 18.6 % of the disc between the flap hinge and the tip.
+    """
+    line = "MR1: Reynolds number outside 50000 to 1e+06, those of the airfoil table, on more than 10% of the disc"
+    for factor, least, most in ((1.0, 0.0, 0.0), (4.0, 0.17, 0.19), (10.0, 1.0, 1.0)):
+        viscous = sbs.with_value("environment.kinematic_viscosity", 1.46e-5 * factor)
+        point = trim(viscous)
+        shares = [state.outside_share for state in states(hovering(viscous, point).snapshot())]
+        assert all(least <= share <= most for share in shares), shares
+        assert (line in point.warnings) == (least > 0.1)
 
 
 # --- finite, and back again -------------------------------------------------------------------------------------

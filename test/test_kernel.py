@@ -1,5 +1,6 @@
 """The compiled code: equal bits in every process."""
 
+import os
 import subprocess
 import sys
 import textwrap
@@ -61,3 +62,47 @@ def digests(order):
 def test_bits_do_not_depend_on_what_was_loaded_first(order):
     """A log is flown again by a process that loads other parts of the model, in another order."""
     assert digests(order) == digests(ORDERS[0])
+
+
+PLAIN = """
+    import math
+    import numba
+    from sbs_sim import Aircraft, Case, linearize, simulate, simulate_batch, sweep, trim
+    from sbs_sim.model.wind import Wind
+
+    small = Aircraft.load("sbs").with_value("options.elements", 2)
+    rough = {"azimuth_count": 1}
+    point = trim(small, **rough)
+    air = Wind(velocity=(1.0, 0.0, 0.0), turbulence_intensity=(1.0, 1.0, 1.0))
+    step = {"tick": 0.002, "azimuth_step": 0.5}
+    flights = [simulate(small, point, point.controls, 0.004, wind=air, method=m, **step) for m in ("rk4", "tsit5")]
+    batch = simulate_batch([Case(small, point, wind=air)], 0.004, every=2, **step)
+    found = sweep(small, "airspeed", [0.0], **rough)
+    numbers = [
+        *(value for flight in flights for value in flight["state"][-1]),
+        *batch["state"][0, -1],
+        *found.points[0].model.a.ravel(),
+        *linearize(small, point=point, method="paper").b.ravel(),
+    ]
+    assert numba.config.DISABLE_JIT == (not hasattr(simulate.__globals__["fly"], "overloads"))
+    print(batch.errors, found.points[0].error, flights[0].warnings)
+    print(*map(repr, map(float, numbers)))
+"""
+
+
+def test_everything_works_without_the_compiler_too():
+    """NUMBA_DISABLE_JIT is how one steps through the model: the same numbers but for rounding."""
+    told, numbers = [], []
+    for disabled in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
+        code = textwrap.dedent(PLAIN)
+        run = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False, env=environment
+        )
+        assert run.returncode == 0, run.stderr
+        line, values = run.stdout.splitlines()
+        told.append(line)
+        numbers.append([float(value) for value in values.split()])
+    assert told == ["(None,) None ()"] * 2
+    assert len(numbers[0]) > 1000
+    assert numbers[1] == pytest.approx(numbers[0], rel=1e-6, abs=1e-6)

@@ -444,6 +444,27 @@ def test_a_trim_of_another_aircraft_is_refused(sbs, hover):
         linearize(build(body={"mass": 30.0}), point=hover)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("airspeed", 15.0),
+        ("airspeed", 0.0),
+        ("climb_rate", 1.0),
+        ("sideslip", 0.1),
+        ("turn_rate", 0.1),
+        ("lead_lag", False),
+        ("cyclic_inflow", True),
+        ("azimuth_count", 12),
+    ],
+)
+def test_a_condition_beside_a_point_is_refused(sbs, hover, name, value):
+    """The point has its own, and one of the two would not count."""
+    with pytest.raises(LinearizationError) as caught:
+        linearize(sbs, point=hover, **{name: value})
+    assert str(caught.value) == f"{name} = {value}: not allowed with a point, which has its own"
+    assert linearize(sbs, point=hover, method="paper", step_scale=0.5).method == "paper"
+
+
 def test_one_azimuth_says_nothing_of_the_spread(sbs):
     assert math.isnan(linearize(sbs, azimuth_count=1).azimuth_spread)
 

@@ -246,6 +246,20 @@ def test_wind_moves_the_aircraft_and_a_gust_passes(client):
         ("reset", Reset, {"heading": math.inf}, "heading"),
         ("reset", Reset, {"position": Point(x=math.nan)}, "north = nan"),
         ("reset", Reset, {"from_state": True, "state": [0.0] * 3}, "3 values"),
+        ("reset", Reset, {"state": [0.0] * 43}, "state: 43 values, allowed with from_state = true only"),
+        (
+            "reset",
+            Reset,
+            {"from_state": True, "state": [0.0] * 43, "turn_rate": 0.1},
+            "turn_rate = 0.1: not allowed with from_state = true, the state has its own",
+        ),
+        (
+            "reset",
+            Reset,
+            {"from_state": True, "position": Point(z=-5.0)},
+            "position.z = -5: not allowed with from_state",
+        ),
+        ("set_wind", SetWind, {"gust": Vector3(z=-4.0)}, "gust_duration = 0: allowed is a length above 0 for a gust"),
         ("reset", Reset, {"from_state": True, "state": [0.0] * 43}, "attitude has a norm of 0"),
         (
             "reset",
@@ -385,6 +399,8 @@ def test_the_status_tells_where_the_model_does_not_hold_and_when_it_does_again(f
     ]
     assert [state.inflow_state for state in told.working_states] == [WorkingState.VORTEX_RING] * 2
     assert all(0.45 < state.descent_ratio < 1.5 for state in told.working_states)
+    assert all(state.tip_mach == pytest.approx(0.373, abs=0.01) for state in told.working_states)
+    assert all(state.outside_share == 0.0 for state in told.working_states)
     health = client.next("diagnostics", lambda m: any("vortex ring" in status.message for status in m.status))
     assert health.status[0].level == DiagnosticStatus.WARN
     assert client.call(SetWind, "set_wind").success
@@ -489,6 +505,10 @@ def test_starts_in_trimmed_forward_flight_with_wind(own_world):
         ({"components": "[autopilot]"}, "parameter components"),
         ({"components": "[control_mixer]"}, "parameter components"),
         ({"components": "[]"}, "parameter components"),
+        (
+            {"components": "[simulator]", "record": "a.mcap"},
+            "record = 'a.mcap': not allowed without the component recorder",
+        ),
         ({"airsped": 3.0}, "parameter airsped: unknown"),
         ({"publish_rate": 1.0, "azimuth_step_deg": 0.01}, "1440000 steps in a tick"),
         ({"wind": "[1.0, 2.0]"}, "parameter wind"),

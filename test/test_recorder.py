@@ -350,6 +350,7 @@ def test_what_cannot_be_recorded_is_refused_in_one_line_and_changes_nothing(tmp_
             return answer.message
 
         assert refusal(record=False) == "record = false: nothing is recorded"
+        assert refusal(path="x.mcap") == "path = 'x.mcap': allowed where a log begins, record = true"
         assert "there.mcap: File exists" in refusal(record=True, path=str(tmp_path / "there.mcap"))
         assert (tmp_path / "there.mcap").read_bytes() == b"mine"
         assert "does not exist" in refusal(record=True, path=str(tmp_path / "none" / "a.mcap"))

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sbs_sim import Aircraft, Simulation, simulate
+from sbs_sim import Aircraft, Case, Simulation, simulate, simulate_batch, trim
 from sbs_sim.errors import SimulationError
+from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.state import ATTITUDE, BODY_SIZE, CONTROL_NAMES, POSITION, RATES, VELOCITY
 from sbs_sim.model.wind import Wind
+from sbs_sim.pilot import flight as piloted
 from sbs_sim.simulation import blade_angles, trimmed_state
 
 DATA = Path(__file__).resolve().parent / "data"
@@ -408,6 +410,105 @@ def test_fidelity_is_passed_on(sbs, hover, option, still):
 # -- whole flights -----------------------------------------------------------------------------------
 
 
+# -- controls and what they may be -----------------------------------------------------------------------------------
+
+
+def beyond(hover, name, degrees):
+    controls = hover.controls.copy()
+    controls[CONTROL_NAMES.index(name)] = math.radians(degrees)
+    return controls
+
+
+RANGES = {"collective": "0 to 0.349066 rad (0 to 20 deg)"}
+RANGES |= dict.fromkeys(CONTROL_NAMES[1:], "-0.20944 to 0.20944 rad (-12 to 12 deg)")
+
+
+@pytest.mark.parametrize("name", CONTROL_NAMES)
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_controls_beyond_their_ranges_are_refused_however_they_are_given(sbs, hover, name, sign):
+    """As the mixer names and limits them: 12 deg of cyclics are within the 16 deg of the swashplate."""
+    low, high = sbs.control_ranges[name]
+    limit = math.degrees(high if sign > 0 else low)
+    good, bad = beyond(hover, name, limit), beyond(hover, name, limit + sign * 0.1)
+    assert len(simulate(sbs, hover, good, 0.01)["time"]) == 2
+    allowed = re.escape(f"{name} = {bad[CONTROL_NAMES.index(name)]:.6g}: allowed are {RANGES[name]}")
+    rows = np.array([good, good, bad])
+    for controls, time in ((bad, 0), (rows, 0.02), (lambda t: good if t < 0.025 else bad, 0.03)):
+        with pytest.raises(SimulationError, match=f"^controls at {time} s: {allowed}$"):
+            simulate(sbs, hover, controls, 0.05)
+
+
+def test_a_step_that_no_actuator_follows_is_flown_and_told(sbs, hover):
+    """120 deg/s are 1.2 deg in a tick of 0.01 s."""
+    step = np.array([0.0, 0.0, 1.0, 0.0])
+    within, beyond = (hover.controls + math.radians(size) * step for size in (1.19, 1.21))
+    assert simulate(sbs, hover, within, 0.02).warnings == ()
+    told = tuple(
+        f"{name}: longitudinal_cyclic is moved faster than its actuator moves, 120 deg/s" for name in ("MR1", "MR2")
+    )
+    flight = simulate(sbs, hover, beyond, 0.02)
+    assert flight.warnings == told
+    assert flight["swashplate"][0].tolist() == sbs.mix(beyond).tolist()  # at once, as linear models have it
+    assert simulate(sbs, hover, np.array([hover.controls, beyond]), 0.02).warnings == told
+    state = trimmed_state(sbs, hover)  # of which nobody knows where the swashplates stood
+    assert simulate(sbs, state, beyond, 0.02).warnings == ()
+    assert simulate(sbs, state, lambda t: hover.controls if t < 0.015 else beyond, 0.02).warnings == told
+    assert simulate_batch([Case(sbs, hover, beyond)], 0.02).warnings == (told,)
+
+
+def test_actuators_are_those_of_the_live_flight(sbs, hover):
+    """The mixer's: what is beyond is clipped and told, the swashplates take their time; bit for bit `pilot.flight`."""
+    wanted = beyond(hover, "longitudinal_cyclic", 15.0)
+    flight = simulate(sbs, hover, wanted, 0.3, actuators=True)
+    assert flight.warnings == ("clipped: longitudinal_cyclic at its limit of 12 deg",)
+    expected = np.minimum(120.0 * flight["time"], 12.0)
+    np.testing.assert_allclose(np.degrees(flight["swashplate"][:, 0, 2]), expected, atol=1e-9)
+    live = piloted.fly(sbs, hover, lambda time, state: wanted, 0.3)
+    for name, values in live.items():
+        assert flight[name].tobytes() == values.tobytes(), name
+    assert live.warnings == flight.warnings
+    batch = simulate_batch([Case(sbs, hover, wanted)], 0.3, actuators=True, outputs=["state"])
+    assert batch["state"][0].tobytes() == flight["state"].tobytes()
+    slow = lambda time: hover.controls + [0.0, 0.01 * math.sin(3.0 * time), 0.0, 0.0]  # noqa: E731
+    both = [simulate(sbs, hover, slow, 0.3, actuators=on)["state"].tobytes() for on in (False, True)]
+    assert both[0] == both[1]  # what they can follow is the same with them
+
+
+def test_rows_of_controls_that_would_not_be_flown_are_refused(sbs, hover):
+    rows = np.tile(hover.controls, (12, 1))
+    assert len(simulate(sbs, hover, rows[:11], 0.1)["time"]) == 11
+    line = r"controls have 12 rows: allowed are up to 11, one for each tick of 0.01 s and the end"
+    with pytest.raises(SimulationError, match=f"^{line}$"):
+        simulate(sbs, hover, rows, 0.1)
+    assert simulate_batch([Case(sbs, hover, rows)], 0.1).errors == (line,)
+
+
+def test_a_trim_of_an_aircraft_with_other_rotors_is_refused(sbs, hover):
+    tandem = Aircraft.load(Path(__file__).resolve().parent / "data" / "tandem.yaml")
+    line = "start: a trim with 38 states: allowed is one of an aircraft with 3, 5 blades, with 46"
+    with pytest.raises(SimulationError, match=f"^{line}$"):
+        simulate(tandem, hover, hover.controls, 0.1)
+    assert simulate_batch([Case(tandem, hover)], 0.1).errors == (line,)
+
+
+def test_attitude_and_airspeed_are_told_by_name(sbs):
+    """In a turn in steady wind: angles as by their definition, and the speed relative to the air."""
+    point = trim(sbs, airspeed=8.0, turn_rate=0.5)
+    wind = Wind(velocity=(4.0, -3.0, 1.0))
+    flight = simulate(sbs, point, point.controls, 1.0, wind=wind)
+    for i in range(0, 101, 10):
+        expected = quaternion_to_euler(flight["state"][i, ATTITUDE:VELOCITY])
+        assert [flight[name][i] for name in ("psi", "theta", "phi")] == pytest.approx(expected, abs=1e-15)
+        to_earth = rotation_matrix(flight["state"][i, ATTITUDE:VELOCITY])
+        air = to_earth @ flight["state"][i, VELOCITY:RATES] - wind.velocity
+        assert flight["V"][i] == pytest.approx(np.linalg.norm(air), rel=1e-12)
+    assert flight["V"][0] == pytest.approx(8.0, rel=1e-9)
+    assert flight["psi"][-1] == pytest.approx(0.5, abs=0.02)
+    with pytest.raises(KeyError, match="no 'alpha': there are north, east, "):
+        flight["alpha"]
+    assert repr(flight).startswith("<flight of 1 s, 101 rows of north, east, ")
+
+
 def test_a_flight_is_told_by_names(sbs, hover):
     flight = simulate(sbs, hover, hover.controls, 0.2)
     assert set(flight) == set(sbs.layout.names) | {
@@ -419,6 +520,10 @@ def test_a_flight_is_told_by_names(sbs, hover):
         "thrust",
         "torque",
         "power",
+        "psi",
+        "theta",
+        "phi",
+        "V",
     }
     shapes = {"state": (21, 43), "controls": (21, 4), "swashplate": (21, 2, 3), "acceleration": (21, 3)}
     shapes |= {"thrust": (21, 2), "torque": (21, 2), "power": (21, 2)}

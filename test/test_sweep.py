@@ -65,12 +65,19 @@ def test_any_number_of_workers_gives_the_same(sbs, speeds, workers):
 @pytest.mark.parametrize("parameter", ["climb_rate", "sideslip", "turn_rate"])
 def test_every_condition_can_be_swept(sbs, parameter):
     condition = {"airspeed": 6.0, "climb_rate": 0.5, "sideslip": 0.1, "turn_rate": 0.2}
-    found = sweep(sbs, parameter, [0.3, -0.3], **condition, azimuth_count=3, lead_lag=False, linear=False)
+    others = {name: value for name, value in condition.items() if name != parameter}
+    found = sweep(sbs, parameter, [0.3, -0.3], **others, azimuth_count=3, lead_lag=False, linear=False)
     for point in found.points:
         changed = {**condition, parameter: point.value}
         assert same(point.trim, trim(sbs, **changed, azimuth_count=3, lead_lag=False))
         assert point.model is None
         assert point.error is None
+
+
+@pytest.mark.parametrize("parameter", ["airspeed", "climb_rate", "sideslip", "turn_rate"])
+def test_what_is_swept_must_not_be_given_too(sbs, parameter):
+    with pytest.raises(SweepError, match=f"^{parameter} = 0.5: not allowed where {parameter} is swept$"):
+        sweep(sbs, parameter, [0.0], **{parameter: 0.5})
 
 
 def test_a_value_of_the_aircraft_can_be_swept(sbs):

@@ -63,9 +63,11 @@ def test_a_gust_without_a_delay_begins_at_once():
     )
 
 
-def test_no_gust_without_duration():
-    array = WindField(Wind(gust=(8.0, 0.0, 0.0)), 0.0, 0.01).next_tick()
-    np.testing.assert_array_equal(air_at(array, 0.0), 0.0)
+def test_a_gust_that_takes_no_time_is_refused():
+    """It would not be felt."""
+    with pytest.raises(SimulationError, match=r"^gust_duration = 0: allowed is a length above 0 for a gust$"):
+        Wind(gust=(8.0, 0.0, 0.0))
+    assert Wind(gust_duration=0.0).gust == (0.0, 0.0, 0.0)
 
 
 def test_a_gust_pushes_the_aircraft(sbs, hover):
@@ -199,7 +201,7 @@ def test_equal_seeds_give_equal_fields_and_others_do_not():
 
 
 def test_ticks_ahead_are_those_one_by_one():
-    wind = dataclasses.replace(TURBULENT, turbulence_seed=5, velocity=(1.0, 2.0, 3.0), gust=(0.0, 1.0, 0.0))
+    wind = dataclasses.replace(TURBULENT, turbulence_seed=5, velocity=(1.0, 2.0, 3.0), gust=(0, 1, 0), gust_duration=3)
     field = WindField(wind, 2.0, 0.01)
     one_by_one = np.array([field.next_tick().copy() for _ in range(40)])
     field = WindField(wind, 2.0, 0.01)

@@ -39,7 +39,7 @@ def sections(rotor, elements, azimuth, velocity, collective, induced):
     [((50.0, 10.0, 3.0), 13), ((-30.0, 40.0, -4.0), 20), ((10.0, -60.0, 8.0), 33), ((-70.0, -20.0, 0.0), 131)],
 )
 def test_shares_of_the_disc_are_those_of_its_sections(velocity, elements):
-    """Areas of annuli r dr; stalled outside of the angles at the section's Reynolds number; reversed by u_T <= 0."""
+    """Areas of annuli r dr: stalled by the angles at the Reynolds number, reversed by u_T <= 0, or in no table."""
     aircraft = build(every_rotor=BLADES, rotors=[{}, {"blades": 5}], options={"elements": elements})
     model, collective, lambda0 = Model(aircraft), 0.1, 0.02
     azimuths = np.array([0.4, 2.9])
@@ -48,7 +48,7 @@ def test_shares_of_the_disc_are_those_of_its_sections(velocity, elements):
     out = np.empty((2, WORKING_SIZE))
     working_state(model.params, x, np.stack([STALL, STALL]), model.work, out)
     for j, rotor in enumerate(aircraft.rotors):
-        area = stalled = turned = 0.0
+        area = stalled = turned = outside = 0.0
         for k in range(rotor.blades):
             azimuth = azimuths[j] + 2 * np.pi * k / rotor.blades
             induced = lambda0 * rotor.speed * rotor.radius
@@ -57,10 +57,12 @@ def test_shares_of_the_disc_are_those_of_its_sections(velocity, elements):
             low, high = np.interp(reynolds, STALL[0], STALL[2]), np.interp(reynolds, STALL[0], STALL[1])
             area += part.sum()
             turned += part[u_t <= 0].sum()
+            outside += part[(reynolds < STALL[0, 0]) | (reynolds > STALL[0, -1])].sum()
             stalled += part[(u_t > 0) & ((alpha < low) | (alpha > high))].sum()
         assert stalled > 0.02 * area
         assert turned > 0.02 * area
-        assert out[j, 4:] == pytest.approx([stalled / area, turned / area], abs=1e-12)
+        assert outside > 0.02 * area
+        assert out[j, 4:] == pytest.approx([stalled / area, turned / area, outside / area], abs=1e-12)
 
 
 @pytest.mark.parametrize("collective", [0.15, -0.15])

@@ -225,6 +225,7 @@ def _contents(model: "LinearModel") -> dict[str, Any]:
     """Everything by name: arrays, numbers, texts, tuples of texts, and mappings of these."""
     return {
         **_fields(model),
+        "warnings": model.warnings,
         "trim": _trim_contents(model.trim),
         "poles": model.poles,
         "mode_names": tuple(mode.name for mode in model.modes),
@@ -285,7 +286,7 @@ def sweep_to_csv(sweep: "Sweep") -> str:
     """Table of a sweep: one row for each point, SI units and radians; cells are empty where a point has none.
 
     Columns: the parameter, attitude, controls, thrust, torque and power of each rotor, the states, the poles of the
-    modes by name, the error.
+    modes by name, where the model does not hold, the error.
     """
     columns = {f"{sweep.parameter} [{sweep.unit(sweep.parameter)}]": sweep.values}
     for name in sweep.names:
@@ -298,8 +299,8 @@ def sweep_to_csv(sweep: "Sweep") -> str:
         columns |= {f"{name}: real [rad/s]": locus.real, f"{name}: imaginary [rad/s]": locus.imag}
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([*columns, "error"])
+    writer.writerow([*columns, "warnings", "error"])
     for i, point in enumerate(sweep.points):
         cells = ["" if math.isnan(column[i]) else repr(float(column[i])) for column in columns.values()]
-        writer.writerow([*cells, point.error or ""])
+        writer.writerow([*cells, "; ".join(point.warnings), point.error or ""])
     return file.getvalue()

@@ -99,6 +99,11 @@ class LinearModel(ByContent):
     kinematics: Array
     blocks: Mapping[str, Array] = field(default_factory=dict)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Where the model does not hold in the flight that it is about, a line each; see `TrimPoint`."""
+        return self.trim.warnings
+
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
         """Modes by name, slowest first."""
@@ -210,14 +215,14 @@ class LinearModel(ByContent):
 
 def linearize(
     aircraft: Aircraft,
-    airspeed: float = 0.0,
-    climb_rate: float = 0.0,
-    sideslip: float = 0.0,
-    turn_rate: float = 0.0,
+    airspeed: float | None = None,
+    climb_rate: float | None = None,
+    sideslip: float | None = None,
+    turn_rate: float | None = None,
     *,
-    lead_lag: bool = True,
-    cyclic_inflow: bool = True,
-    azimuth_count: int = 12,
+    lead_lag: bool | None = None,
+    cyclic_inflow: bool | None = None,
+    azimuth_count: int | None = None,
     method: str = "averaged",
     step_scale: float = 1.0,
     point: TrimPoint | None = None,
@@ -227,13 +232,14 @@ def linearize(
     Parameters
     ----------
     aircraft, airspeed, climb_rate, sideslip, turn_rate, lead_lag, cyclic_inflow, azimuth_count :
-        See `sbs_sim.trim`.
+        See `sbs_sim.trim`, which has the defaults.
     method : str
         "averaged" or "paper".
     step_scale : float
         Factor on all steps of the differences, 0.001 to 10.
     point : TrimPoint, optional
-        A trim of this aircraft to linearize about; condition, fidelity and azimuth count are then its own.
+        A trim of this aircraft to linearize about. Condition, fidelity and azimuth count are then its own, and must
+        not be given beside it.
 
     Returns
     -------
@@ -244,22 +250,26 @@ def linearize(
     TrimError
         See `sbs_sim.trim`.
     LinearizationError
-        A value out of range, or a trim of another aircraft.
+        A value out of range, a trim of another aircraft, or a condition together with a trim.
     """
     checks.instance("aircraft", aircraft, Aircraft, LinearizationError)
     checks.choice("method", method, METHODS, LinearizationError)
     step_scale = checks.number("step_scale", step_scale, *STEP_SCALES, "", LinearizationError)
+    given: dict[str, Any] = {
+        "airspeed": airspeed,
+        "climb_rate": climb_rate,
+        "sideslip": sideslip,
+        "turn_rate": turn_rate,
+        "lead_lag": lead_lag,
+        "cyclic_inflow": cyclic_inflow,
+        "azimuth_count": azimuth_count,
+    }
+    given = {name: value for name, value in given.items() if value is not None}
     if point is None:
-        point = trim(
-            aircraft,
-            airspeed,
-            climb_rate,
-            sideslip,
-            turn_rate,
-            lead_lag=lead_lag,
-            cyclic_inflow=cyclic_inflow,
-            azimuth_count=azimuth_count,
-        )
+        point = trim(aircraft, **given)
+    elif given:
+        name, value = next(iter(given.items()))
+        raise LinearizationError(f"{name} = {checks.shown(value)}: not allowed with a point, which has its own")
     checks.instance("point", point, TrimPoint, LinearizationError)
     if point.parameter_hash != aircraft.parameter_hash:
         raise LinearizationError("point: allowed is a trim of this aircraft, it is one of another")

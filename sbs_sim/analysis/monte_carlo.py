@@ -124,8 +124,8 @@ def quantities(batch: Batch) -> dict[str, Array]:
 def batch_to_dict(batch: Batch) -> dict[str, Any]:
     """Flights with what was scattered, and the percentiles over time, for JSON."""
     flights = [
-        {"seed": case.wind.turbulence_seed, "changes": dict(case.changes), "error": error}
-        for case, error in zip(batch.cases, batch.errors, strict=True)
+        {"seed": case.wind.turbulence_seed, "changes": dict(case.changes), "warnings": warnings, "error": error}
+        for case, warnings, error in zip(batch.cases, batch.warnings, batch.errors, strict=True)
     ]
     found = {name: percentiles(values, SHARES) for name, values in quantities(batch).items()}
     return {
@@ -139,17 +139,18 @@ def batch_to_dict(batch: Batch) -> dict[str, Any]:
 
 
 def batch_to_csv(batch: Batch) -> str:
-    """Table of flights: seed, what was scattered, the last that was flown of every quantity, and the error."""
+    """Table of flights: seed, what was scattered, the last that was flown of every quantity, warnings, error."""
     flown = quantities(batch)
     ends = (~np.isnan(batch["state"]).all(axis=2)).sum(axis=1) - 1
     paths = list(batch.cases[0].changes)
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     units = [f"{path} [{unit_of(path)}]" if unit_of(path) else path for path in paths]
-    writer.writerow(["flight", "seed", *units, "time [s]", *flown, "error"])
+    writer.writerow(["flight", "seed", *units, "time [s]", *flown, "warnings", "error"])
     for i, (case, end) in enumerate(zip(batch.cases, ends, strict=True)):
         last = [batch.time[end], *(values[i, end] for values in flown.values())] if end >= 0 else []
         numbers = [*(case.changes[path] for path in paths), *last]
         cells = [repr(float(number)) for number in numbers] + [""] * (1 + len(flown) - len(last))
-        writer.writerow([i, case.wind.turbulence_seed, *cells, batch.errors[i] or ""])
+        told = "; ".join(batch.warnings[i])
+        writer.writerow([i, case.wind.turbulence_seed, *cells, told, batch.errors[i] or ""])
     return file.getvalue()

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim import interruption
 from sbs_sim.content import ByContent
 
 Array = NDArray[np.float64]
@@ -54,6 +55,7 @@ def newton(equations: Equations, start: Array, jacobian: Equations | None = None
     slope = jacobian or (lambda values: _jacobian(equations, values))
     values, residual, matrix = start, equations(start), None
     for iteration in range(MOST_ITERATIONS):
+        interruption.look()
         size = float(np.abs(residual).max())
         if size < TOLERANCE:
             return Solution(values, residual, iteration, True)

@@ -61,6 +61,11 @@ class SweepPoint:
     model: LinearModel | None
     error: str | None
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Where the model does not hold in this flight, a line each, see `TrimPoint`; empty without a trim."""
+        return () if self.trim is None else self.trim.warnings
+
 
 @dataclass(frozen=True)
 class Sweep:
@@ -95,6 +100,11 @@ class Sweep:
     def failed(self) -> tuple[SweepPoint, ...]:
         """Points with an error."""
         return tuple(point for point in self.points if point.error is not None)
+
+    @cached_property
+    def warnings(self) -> tuple[tuple[str, ...], ...]:
+        """Of each point, where the model does not hold."""
+        return tuple(point.warnings for point in self.points)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -174,6 +184,7 @@ class Sweep:
             {
                 "value": point.value,
                 "error": point.error,
+                "warnings": list(point.warnings),
                 "trim": trim_to_dict(point.trim) if point.trim else None,
                 "model": model_to_dict(point.model, with_trim=False) if point.model else None,
             }
@@ -190,10 +201,10 @@ def sweep(
     parameter: str,
     values: ArrayLike,
     *,
-    airspeed: float = 0.0,
-    climb_rate: float = 0.0,
-    sideslip: float = 0.0,
-    turn_rate: float = 0.0,
+    airspeed: float | None = None,
+    climb_rate: float | None = None,
+    sideslip: float | None = None,
+    turn_rate: float | None = None,
     lead_lag: bool = True,
     cyclic_inflow: bool = True,
     azimuth_count: int = 12,
@@ -213,7 +224,7 @@ def sweep(
     values : array_like, shape (n_points,)
         Of the parameter, in any order; in the unit of `sbs_sim.trim` or of the aircraft file.
     airspeed, climb_rate, sideslip, turn_rate, lead_lag, cyclic_inflow, azimuth_count :
-        See `sbs_sim.trim`; the one that is the parameter is ignored.
+        See `sbs_sim.trim`, which has the defaults; the one that is the parameter must not be given.
     linear : bool
         False leaves the linear models out.
     workers : int, optional
@@ -235,7 +246,8 @@ def sweep(
     Raises
     ------
     SweepError
-        No values, one that is not finite, an unknown parameter, no whole number of workers.
+        No values, one that is not finite, an unknown parameter, or one that is given a single value too; no whole
+        number of workers.
     ClusterError
         A cluster that cannot be reached, or that would not give the same.
     """
@@ -244,6 +256,9 @@ def sweep(
     linear = checks.flag("linear", linear, SweepError)
     _check_parameter(aircraft, parameter)
     condition = {"airspeed": airspeed, "climb_rate": climb_rate, "sideslip": sideslip, "turn_rate": turn_rate}
+    condition = {name: value for name, value in condition.items() if value is not None}
+    if parameter in condition:
+        raise SweepError(f"{parameter} = {checks.shown(condition[parameter])}: not allowed where {parameter} is swept")
     fidelity = {"lead_lag": lead_lag, "cyclic_inflow": cyclic_inflow, "azimuth_count": azimuth_count}
     count = checked_workers(workers, dask, SweepError)
     points = [SweepPoint(value, None, None, CANCELLED) for value in numbers]

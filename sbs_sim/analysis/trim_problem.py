@@ -19,8 +19,11 @@ from sbs_sim.errors import TrimError
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.average import averaged_derivative, azimuths
+from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.frames import euler_to_quaternion, hub_axes, rotation_matrix
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
+from sbs_sim.model.working_state import WORKING_SIZE, working_state
+from sbs_sim.validity import warnings
 
 Array = NDArray[np.float64]
 
@@ -115,6 +118,8 @@ class TrimPoint(ByContent):
         Iterations of the inner loop in all; 0 with Newton's method.
     beyond_limits : tuple of str
         Controls and swashplate angles that the trim needs beyond their range; empty if it can be flown.
+    warnings : tuple of str
+        Where the model does not hold, a line each: vortex ring, stall, Mach and Reynolds numbers ...; empty if it does.
     parameter_hash : str
         Of the aircraft, see `Aircraft.parameter_hash`.
     """
@@ -137,6 +142,7 @@ class TrimPoint(ByContent):
     iterations: int
     inner_iterations: int
     beyond_limits: tuple[str, ...]
+    warnings: tuple[str, ...]
     parameter_hash: str
 
     def to_dict(self) -> dict[str, Any]:
@@ -308,8 +314,19 @@ class TrimProblem:
             iterations=iterations,
             inner_iterations=inner_iterations,
             beyond_limits=self.beyond_limits(unknowns),
+            warnings=self._warnings(x, swash),
             parameter_hash=self.aircraft.parameter_hash,
         )
+
+    def _warnings(self, x: Array, swash: Array) -> tuple[str, ...]:
+        """Where the model does not hold, by the mean of the working states over a few azimuths."""
+        stall, count = self.aircraft.stall_table, len(self.aircraft.rotors)
+        psi = azimuths(self.layout.blades, min(self.azimuth_count, JACOBIAN_AZIMUTHS))
+        rows, slope, still_air = np.empty((len(psi), count, WORKING_SIZE)), np.zeros(self.layout.size), np.zeros(3)
+        for place, row in zip(psi, rows, strict=True):
+            derivative(self.params, x, swash, place, still_air, self.work, slope)
+            working_state(self.params, x, stall, self.work, row)
+        return tuple(warnings(self.aircraft, rows.mean(axis=0)))
 
 
 def _beyond_limits(aircraft: Aircraft, controls: Array, swash: Array) -> tuple[str, ...]:

@@ -1,10 +1,12 @@
 """`batch`: Monte Carlo flights through turbulence, as a table of percentiles, a plot and files."""
 
 import argparse
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from sbs_sim.command_line import assignment
 from sbs_sim.commands.common import (
+    OUTSIDE,
     add_flight_arguments,
     add_worker_arguments,
     aircraft,
@@ -119,6 +121,8 @@ def _print_batch(batch: "Batch") -> None:
         found = percentiles(values, SHARES)
         rows.append([name, *(fixed(value, 3) for value in (found[2, 0], *found[:, -1]))])
     print_table(["", "start, 50 %", *(f"end, {share:g} %" for share in SHARES)], rows)
+    for text, count in Counter(line for lines in batch.warnings for line in lines).most_common():
+        print(f"{OUTSIDE} in {count} flights: {text}")
     for i in batch.failed[:LISTED]:
         print(f"flight {i} (seed {batch.cases[i].wind.turbulence_seed}): {batch.errors[i]}")
     if len(batch.failed) > LISTED:

@@ -10,6 +10,7 @@ import os
 import re
 import signal
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 DEGREES = 180.0 / math.pi
 INTERRUPTED = 130
+OUTSIDE = "outside the model's validity"
 # What may follow an option without being one itself; argparse of Python up to 3.13 knows no exponents.
 NEGATIVE_NUMBER = re.compile(r"-((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|inf|infinity|nan)", re.IGNORECASE)
 
@@ -58,10 +60,17 @@ def execute(
 
 def _behave_on_a_terminal() -> None:
     """No tracebacks for Ctrl-C (also while modules are imported), closed pipes, and characters that cannot be shown."""
-    signal.signal(signal.SIGINT, lambda *_: os._exit(INTERRUPTED))
+    # By a thread: Python's own handlers wait for the end of compiled code, and of compiling.
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    threading.Thread(target=_end_when_interrupted, name="interrupts", daemon=True).start()
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal may not know every character
+
+
+def _end_when_interrupted() -> None:
+    signal.sigwait({signal.SIGINT})
+    os._exit(INTERRUPTED)
 
 
 # --- arguments --------------------------------------------------------------------------------------------------
@@ -92,7 +101,7 @@ def add_flight_arguments(parser: argparse.ArgumentParser) -> None:
         ("--sideslip-deg", "deg", "from the heading to the track, positive to the right"),
         ("--turn-rate-deg", "deg/s", "of the heading, positive to the right"),
     ):
-        group.add_argument(name, type=float, default=0.0, metavar="X", help=f"{meaning} [{unit}]")
+        group.add_argument(name, type=float, metavar="X", help=f"{meaning} [{unit}] (default: 0)")
     group = parser.add_argument_group("fidelity")
     group.add_argument("--no-lead-lag", dest="lead_lag", action="store_false", help="hold the blades at zero lag")
     group.add_argument(
@@ -122,18 +131,21 @@ def aircraft(arguments: argparse.Namespace) -> "Aircraft":
 
 
 def flight(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Arguments for `sbs_sim.trim`: condition and fidelity, in SI units and radians.
+    """Arguments for `sbs_sim.trim`: condition, as far as it is given, and fidelity, in SI units and radians.
 
     Raises
     ------
     TrimError
         An angle out of range, in degrees as it was typed.
     """
-    return {
+    condition = {
         "airspeed": arguments.airspeed,
         "climb_rate": arguments.climb_rate,
-        "sideslip": radians("sideslip", arguments.sideslip_deg),
-        "turn_rate": radians("turn_rate", arguments.turn_rate_deg),
+        "sideslip": arguments.sideslip_deg and radians("sideslip", arguments.sideslip_deg),
+        "turn_rate": arguments.turn_rate_deg and radians("turn_rate", arguments.turn_rate_deg),
+    }
+    return {
+        **{name: value for name, value in condition.items() if value is not None},
         "lead_lag": arguments.lead_lag,
         "cyclic_inflow": arguments.cyclic_inflow,
         "azimuth_count": arguments.azimuth_count,
@@ -171,6 +183,14 @@ def print_heading(what: str, craft: "Aircraft", point: "TrimPoint") -> None:
     lag = "with lead-lag" if point.lead_lag else "without lead-lag"
     inflow = "with cyclic inflow" if point.cyclic_inflow else "without cyclic inflow"
     print(f"{lag}, {inflow}, {point.azimuth_count} azimuths; {solution(point)}")
+
+
+def print_limits(point: "TrimPoint") -> None:
+    """What a trim needs beyond its limits, and where the model does not hold."""
+    for text in point.beyond_limits:
+        print(f"beyond its limits: {text}")
+    for text in point.warnings:
+        print(f"{OUTSIDE}: {text}")
 
 
 def solution(point: "TrimPoint") -> str:

@@ -4,7 +4,16 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
-from sbs_sim.commands.common import DEGREES, UsageError, add_aircraft_arguments, aircraft, execute, fixed, print_table
+from sbs_sim.commands.common import (
+    DEGREES,
+    OUTSIDE,
+    UsageError,
+    add_aircraft_arguments,
+    aircraft,
+    execute,
+    fixed,
+    print_table,
+)
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
@@ -85,13 +94,17 @@ def _work(arguments: argparse.Namespace) -> None:
     found = design(HoverModel.of(model), dict(arguments.limit))
     print(f"hover hold of {craft.name}")
     print("\n".join(found.describe()))
-    results = {
-        name: _figures(_flown(craft, model, found, air, settling + duration, arguments.delay), settling)
-        for name, (air, settling, duration) in airs.items()
-    }
+    results, warnings = {}, {}
+    for name, (air, settling, duration) in airs.items():
+        flight = _flown(craft, model, found, air, settling + duration, arguments.delay)
+        results[name], warnings[name] = _figures(flight, settling), flight.warnings
     _print(results)
+    for name, lines in warnings.items():
+        for line in lines:
+            print(f"{name}: {line if line.startswith('clipped') else f'{OUTSIDE}: {line}'}")
     if arguments.json:
-        export.write(arguments.json, export.to_json(results))
+        told = {name: {**figures, "warnings": warnings[name]} for name, figures in results.items()}
+        export.write(arguments.json, export.to_json(told))
 
 
 def _airs(arguments: argparse.Namespace) -> dict[str, tuple["Wind", float, float]]:

@@ -11,6 +11,7 @@ from sbs_sim.commands.common import (
     fixed,
     flight,
     print_heading,
+    print_limits,
     print_table,
 )
 
@@ -115,8 +116,7 @@ def _print_model(craft: "Aircraft", model: "LinearModel") -> None:
     spread = model.azimuth_spread
     print("azimuth spread unknown from one azimuth" if spread != spread else f"azimuth spread {spread:.3g}")
     print(f"parameters {model.parameter_hash}")
-    for text in model.trim.beyond_limits:
-        print(f"beyond its limits: {text}")
+    print_limits(model.trim)
 
 
 def pole_cells(pole: complex) -> list[str]:

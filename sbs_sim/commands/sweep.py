@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from sbs_sim.commands.common import (
     DEGREES,
+    OUTSIDE,
     UsageError,
     add_flight_arguments,
     add_worker_arguments,
@@ -67,6 +68,8 @@ def _work(arguments: argparse.Namespace) -> None:
     parameter = TYPED.get(typed, arguments.parameter)
     if f"{typed}_deg" in TYPED:
         raise UsageError(f"parameter {typed}: angles are typed in degrees, as {typed}_deg")
+    if getattr(arguments, typed, None) is not None and typed in TYPED:
+        raise UsageError(f"--{typed.replace('_', '-')}: not allowed where {typed} is swept")
     values = _values(arguments)
     if typed.endswith("_deg") and typed in TYPED:
         values = [math.radians(value) for value in values]
@@ -138,6 +141,8 @@ def _print_sweep(found: "Sweep") -> None:
             print(f"{found.parameter} {value:g}: {_error(found, value, point)}")
         elif point.trim is not None and point.trim.beyond_limits:
             print(f"{found.parameter} {value:g}: beyond its limits: {'; '.join(point.trim.beyond_limits)}")
+        if point.warnings:
+            print(f"{found.parameter} {value:g}: {OUTSIDE}: {'; '.join(point.warnings)}")
 
 
 def _error(found: "Sweep", shown: float, point: "SweepPoint") -> str:

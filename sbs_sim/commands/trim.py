@@ -11,6 +11,7 @@ from sbs_sim.commands.common import (
     fixed,
     flight,
     print_heading,
+    print_limits,
     print_table,
 )
 
@@ -65,8 +66,7 @@ def print_trim(craft: "Aircraft", point: "TrimPoint") -> None:
     print_table(["rotors", *(rotor.name for rotor in craft.rotors)], _rotor_rows(craft, point))
     print()
     print(f"power of all rotors {point.power.sum():.2f} W")
-    for text in point.beyond_limits:
-        print(f"beyond its limits: {text}")
+    print_limits(point)
 
 
 def _rotor_rows(craft: "Aircraft", point: "TrimPoint") -> list[list[str]]:

@@ -6,15 +6,15 @@ from sbs_sim.model.kernel import entry
 
 @entry
 def fly(
-    advance, derivative, p, x, psi0, step, steps, h, method, bounds, work, swash, winds, ticks, offset, every, loaded,
-    azimuths, air, states, forces, loads, slope,
+    advance, derivative, working_state, p, x, psi0, step, steps, h, method, bounds, work, swash, winds, ticks, offset,
+    every, loaded, azimuths, air, states, forces, loads, slope, stall, first_look, watch, looks, look_air, working,
 ):  # fmt: skip
     """Fly ticks one after another, and write down the first of every `every` ones.
 
     Parameters
     ----------
-    advance, derivative : Address
-        Of the entries `advance` and `derivative`: the machine code with which flights tick by tick are flown.
+    advance, derivative, working_state : Address
+        Of the entries of these names: the machine code with which flights tick by tick are flown.
     p, x, psi0, steps, h, method, bounds, work :
         See `advance`; x is overwritten.
     step : int
@@ -38,6 +38,14 @@ def fly(
         Outputs: state, specific force of the c.g. [m/s^2], see `Work`.
     slope : ndarray, shape (size,)
         Memory.
+    stall : ndarray, shape (n_rotors, 3, n)
+        See `working_state`.
+    first_look, watch : int
+        Ticks from the start until one whose working states are written down, and from one of these to the next.
+    looks, look_air : ndarray, shapes (n_looks, n_rotors), (n_looks, 3)
+        Azimuths [rad] and velocity of the air [m/s] there.
+    working : ndarray, shape (n_looks, n_rotors, WORKING_SIZE)
+        Output: working states.
 
     Returns
     -------
@@ -46,8 +54,12 @@ def fly(
     culprit : int
         Index of the state that would leave the plausible, -1 if none.
     """
-    row = 0
+    row = look = 0
     for i in range(swash.shape[0]):
+        if i == first_look + look * watch:
+            derivative(p, x, swash[i], looks[look], look_air[look], work, slope)
+            working_state(p, x, stall, work, working[look])
+            look += 1
         if i == offset + row * every:
             copy_numbers(x, states[row])
             if loaded:

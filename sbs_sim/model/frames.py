@@ -38,6 +38,22 @@ def quaternion_to_euler(quaternion: ArrayLike) -> tuple[float, float, float]:
     return yaw, pitch, roll
 
 
+def euler_angles(quaternions: Array) -> Array:
+    """Yaw, pitch, roll [rad], shape (n, 3), of unit quaternions (w, x, y, z), shape (n, 4); pitch within +-pi/2."""
+    w, x, y, z = np.asarray(quaternions).T
+    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    return np.stack([yaw, pitch, roll], axis=1)
+
+
+def to_body(quaternions: Array, vectors: Array) -> Array:
+    """Body components of vectors in earth components, both (n, 3), at attitudes (w, x, y, z), (n, 4)."""
+    w, axis = quaternions[:, :1], -quaternions[:, 1:]  # the conjugate turns back
+    turned = 2.0 * np.cross(axis, vectors)
+    return np.asarray(vectors + w * turned + np.cross(axis, turned))
+
+
 def rotation_matrix(quaternion: ArrayLike) -> Array:
     """R_NB, shape (3, 3), of a unit quaternion (w, x, y, z): earth components = R_NB @ body components."""
     w, x, y, z = np.asarray(quaternion, dtype=float)

@@ -75,6 +75,11 @@ class Address(WrapperAddressProtocol):
         return self._code.signature
 
 
+def address(function: Any, *arguments: Any) -> Any:
+    """`Address` of an entry; the entry itself where numba compiles nothing (NUMBA_DISABLE_JIT)."""
+    return function if numba.config.DISABLE_JIT else Address(function, *arguments)
+
+
 def cache_folder() -> Path:
     """Where the machine code of these very sources is kept.
 

@@ -30,6 +30,7 @@ LINEAR_U, LINEAR_W, LINEAR_Q, LINEAR_THETA, LINEAR_V, LINEAR_P, LINEAR_PHI, LINE
 LINEAR_BODY_NAMES = ("u", "w", "q", "theta", "v", "p", "phi", "r")
 LINEAR_BODY_UNITS = ("m/s", "m/s", "rad/s", "rad", "m/s", "rad/s", "rad", "rad/s")
 CONTROL_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")
+EULER_NAMES, AIRSPEED = ("psi", "theta", "phi"), "V"  # what can be told of a simulation state besides
 SWASHPLATE_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic")
 INFLOW_NAMES = ("lambda0", "lambdas", "lambdac")
 

@@ -58,7 +58,7 @@ class Wind:
     gust : tuple of 3 floats
         Peak of the 1-cosine gust, NED [m/s].
     gust_delay, gust_duration : float
-        Start after now and length [s]; no gust for a duration of 0.
+        Start after now and length [s]; a gust has a length above 0.
     turbulence_intensity : tuple of 3 floats
         Standard deviation of the Dryden turbulence along the direction in which the field passes, across it and
         vertically [m/s].
@@ -74,7 +74,7 @@ class Wind:
     Raises
     ------
     SimulationError
-        For a value that is not finite or out of range, naming field, value and range.
+        For a value that is not finite or out of range, naming field, value and range; for a gust that takes no time.
     """
 
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -102,6 +102,8 @@ class Wind:
             object.__setattr__(self, name, tuple(numbers))
         for name, (least, most, unit) in RANGES.items():
             object.__setattr__(self, name, checks.number(name, getattr(self, name), least, most, unit, SimulationError))
+        if any(self.gust) and not self.gust_duration > 0.0:
+            raise SimulationError("gust_duration = 0: allowed is a length above 0 for a gust")
         seed = checks.whole("turbulence_seed", self.turbulence_seed, 0, 2**64 - 1, SimulationError)
         object.__setattr__(self, "turbulence_seed", seed)
 

@@ -7,8 +7,8 @@ from sbs_sim.model import state as S
 from sbs_sim.model.kernel import entry, kernel
 
 # columns of a rotor's row
-ADVANCE_RATIO, HOVER_INFLOW, DESCENT, FLOW, STALLED, REVERSED = range(6)
-WORKING_SIZE = 6
+ADVANCE_RATIO, HOVER_INFLOW, DESCENT, FLOW, STALLED, REVERSED, OUTSIDE = range(7)
+WORKING_SIZE = 7
 
 # rows of a rotor's stall angles
 REYNOLDS, HIGHEST, LOWEST = range(3)
@@ -31,7 +31,8 @@ def working_state(p, x, stall, work, out):
     out : ndarray, shape (n_rotors, WORKING_SIZE)
         Output: advance ratio; hover inflow ratio of the present thrust, a_w sqrt(2 |C_T|); velocity of the hub against
         the thrust and flow through the disc with it, both over the tip speed; shares of the disc, between flap hinge
-        and tip, where sections are stalled and where the flow comes from behind, as the blades meet it now.
+        and tip, where sections are stalled, where the flow comes from behind, and where the Reynolds number is outside
+        of the airfoil's table, as the blades meet it now.
     """
     for j in range(p.rotor.shape[0]):
         rotor, row = p.rotor[j], out[j]
@@ -42,13 +43,13 @@ def working_state(p, x, stall, work, out):
         row[HOVER_INFLOW] = rotor[P.DUCT] * math.sqrt(2.0 * abs(work.aero[j, 0]) * rotor[P.LOAD_SCALE])
         row[DESCENT] = sense * mu_z
         row[FLOW] = sense * (x[S.BODY_SIZE + 4 * p.first_blade[-1] + 3 * j] - mu_z)
-        row[STALLED], row[REVERSED] = _shares(p, j, stall[j], work)
+        row[STALLED], row[REVERSED], row[OUTSIDE] = _shares(p, j, stall[j], work)
 
 
 @kernel
 def _shares(p, j, stall, work):
-    """Shares of the disc of rotor j that are stalled and in reverse flow; an annulus counts by its area."""
-    area = stalled = reversed_ = 0.0
+    """Shares of the disc of rotor j that are stalled, in reverse flow, and outside of the table, by area."""
+    area = stalled = reversed_ = outside = 0.0
     hinge = p.rotor[j, P.HINGE]
     for blade in range(p.first_blade[j + 1] - p.first_blade[j]):
         row, lane = work.blade[p.first_block[j] + blade // P.LANES], blade % P.LANES
@@ -60,16 +61,18 @@ def _shares(p, j, stall, work):
                 part = (hinge + span) * element[P.HALF_AREA + i] / chord
                 ut, up = ut0 + ut1 * span, up0 + up1 * span
                 area += part
+                reynolds = math.sqrt(ut * ut + up * up) * chord * p.air[P.INVERSE_VISCOSITY]
+                if not stall[REYNOLDS, 0] <= reynolds <= stall[REYNOLDS, -1]:
+                    outside += part
                 if ut <= 0.0:
                     reversed_ += part
                 else:
                     alpha = row[P.PITCH + lane] + element[P.TWIST + i] - math.atan2(up, ut)
-                    reynolds = math.sqrt(ut * ut + up * up) * chord * p.air[P.INVERSE_VISCOSITY]
                     low = _between(stall[REYNOLDS], stall[LOWEST], reynolds)
                     high = _between(stall[REYNOLDS], stall[HIGHEST], reynolds)
                     if not low <= alpha <= high:
                         stalled += part
-    return stalled / area, reversed_ / area
+    return stalled / area, reversed_ / area, outside / area
 
 
 @kernel

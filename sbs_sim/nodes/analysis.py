@@ -77,7 +77,7 @@ class Analysis(Component):
     def _on_trim(self, request: Trim.Request, response: Trim.Response) -> Trim.Response:
         def act() -> None:
             point = trim(self._aircraft, **_condition(request), method=request.method)
-            response.trim = trim_message(self._aircraft, point)
+            response.trim, response.warnings = trim_message(self._aircraft, point), point.warnings
             self._trim_point.publish(response.trim, self._now())
 
         return self.answer(response, act, "trimmed")
@@ -85,7 +85,7 @@ class Analysis(Component):
     def _on_linearize(self, request: Linearize.Request, response: Linearize.Response) -> Linearize.Response:
         def act() -> None:
             model = linearize(self._aircraft, **_condition(request), method=request.method)
-            response.model = model_message(self._aircraft, model)
+            response.model, response.warnings = model_message(self._aircraft, model), model.warnings
             self._linear_model.publish(response.model, self._now())
 
         return self.answer(response, act, "linearized")
@@ -121,11 +121,14 @@ class Analysis(Component):
         request = goal.request
         if len(request.values) > MOST_POINTS:
             raise SbsError(f"values: {len(request.values)} of them, allowed are 1 to {MOST_POINTS}")
+        condition = _condition(request)
+        if condition.get(request.parameter) == 0.0:  # what a request has that does not say it
+            del condition[request.parameter]
         swept = sweep(
             self._aircraft,
             request.parameter,
             request.values.tolist(),
-            **_condition(request),
+            **condition,
             linear=request.linear,
             workers=self._sweep_workers,
             progress=tell,
@@ -145,6 +148,7 @@ def _feedback(point: SweepPoint, done: int, total: int) -> Sweep.Feedback:
         last_value=point.value,
         last_success=point.error is None,
         last_message=point.error or "",
+        last_warnings=point.warnings,
     )
 
 

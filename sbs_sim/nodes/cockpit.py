@@ -122,6 +122,8 @@ def main(args: list[str] | None = None) -> None:
     own = rclpy.utilities.remove_ros_args(arguments)[1:]
     options = _parse(own)
     ros_arguments = arguments[1 + len(own) :]
+    if (options.attach or options.logs) and (given := {"-p", "--param", "--params-file"} & set(ros_arguments)):
+        make_parser().error(f"{min(given)}: parameters are those of a simulator: not allowed with --attach and --logs")
     end = threading.Event()
     start = Start(options, ros_arguments, end)
     code = run(start.nodes, [arguments[0], *ros_arguments], end)

@@ -176,8 +176,10 @@ def fill_working_states(status: SimulationStatus, aircraft: Aircraft, snapshot: 
             stalled_share=state.stalled_share,
             reversed_share=state.reversed_share,
             inflow_state=validity.INFLOW_STATES.index(state.inflow_state),
+            tip_mach=validity.tip_mach(aircraft, rotor, row),
+            outside_share=state.outside_share,
         )
-        for state in states
+        for rotor, row, state in zip(aircraft.rotors, snapshot.working, states, strict=True)
     ]
 
 
@@ -348,6 +350,7 @@ def trim_message(aircraft: Aircraft, point: trim.TrimPoint) -> TrimPoint:
         iterations=point.iterations,
         inner_iterations=point.inner_iterations,
         beyond_limits=point.beyond_limits,
+        warnings=point.warnings,
     )
 
 
@@ -404,6 +407,7 @@ def model_message(aircraft: Aircraft, model: linearize.LinearModel) -> LinearMod
         method=model.method,
         parameter_hash=model.parameter_hash,
         blocks=[_matrix_message(name, matrix) for name, matrix in model.blocks.items()],
+        warnings=model.warnings,
     )
 
 
@@ -439,6 +443,7 @@ def _aircraft_at(aircraft: Aircraft, parameter: str, point: sweep.SweepPoint) ->
 
 def _sweep_point_message(aircraft: Aircraft, point: sweep.SweepPoint) -> SweepPoint:
     message = SweepPoint(value=point.value, success=point.error is None, message=point.error or "")
+    message.warnings = point.warnings
     if point.trim is not None:
         message.trim = trim_message(aircraft, point.trim)
     if point.model is not None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.qos import QoSProfile
 
 from sbs_msgs.srv import Record
+from sbs_sim import checks
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.nodes.host import SERVICE_QOS, Component
@@ -136,6 +137,8 @@ class Recording(Component):
 
     def _act(self, request: Record.Request) -> None:
         if not request.record:
+            if request.path:
+                raise RecordingError(f"path = {checks.shown(request.path)}: allowed where a log begins, record = true")
             if not self.end():
                 raise RecordingError("record = false: nothing is recorded")
             return

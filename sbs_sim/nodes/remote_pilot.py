@@ -2,7 +2,9 @@
 
 import dataclasses
 import math
+import re
 import threading
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,7 @@ from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS
 Array = NDArray[np.float64]
 Answer = tuple[bool, str]
 
+MARKUP = re.compile(r"[^A-Za-z0-9 .,:]")
 PATIENCE = 10.0  # s for an answer
 ANALYSIS_PATIENCE = 60.0  # s for a trim or a linear model
 COMMAND_PERIOD = 0.1  # s between commands that hold the controls
@@ -138,13 +141,30 @@ class RemotePilot:
         table = "\n".join(f"| {name} | {round(value, 3) + 0.0:.3f} | deg |" for name, value in rows)
         return True, (
             f"**Trim at {_words(condition)}**\n\n| | | |\n|---|--:|---|\n{table}\n| thrust | {point.thrust:.1f} | N |\n"
-            f"| power | {point.power:.0f} | W |\n" + "".join(f"\n{text}\n" for text in point.beyond_limits)
+            f"| power | {point.power:.0f} | W |\n{_paragraphs(point.beyond_limits)}{_validity(response.warnings)}"
         )
 
     def linearize(self, condition: TrimCondition) -> Answer:
         """Linearize about a condition; the model comes by `linear_model`."""
-        done, message = self._ask("linearize", Linearize.Request(**_condition(condition)), ANALYSIS_PATIENCE)
-        return done, f"Linear model at {_words(condition)}: see *Modes*" if done else message
+        response = self._call("linearize", Linearize.Request(**_condition(condition)), ANALYSIS_PATIENCE)
+        if response is None:
+            return False, "no answer of linearize: is there an analysis node?"
+        if not response.success:
+            return False, response.message
+        return True, f"Linear model at {_words(condition)}: see *Modes*\n{_validity(response.warnings)}"
+
+
+def _paragraphs(lines: Sequence[str]) -> str:
+    """Lines that come from a file or a message, as Markdown in which nothing of them is markup."""
+    return "".join(f"\n{MARKUP.sub(_entity, line)}\n" for line in lines)
+
+
+def _entity(mark: "re.Match[str]") -> str:
+    return f"&#{ord(mark[0])};"
+
+
+def _validity(warnings: Sequence[str]) -> str:
+    return _paragraphs([f"outside the model's validity: {line}" for line in warnings])
 
 
 def _condition(condition: TrimCondition) -> dict[str, float]:

@@ -16,7 +16,7 @@ from sbs_msgs.msg import SwashplateArray
 from sbs_msgs.srv import Reset, SetWind, Step
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint, trim
-from sbs_sim.errors import SbsError, TrimError
+from sbs_sim.errors import SbsError, SimulationError, TrimError
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
@@ -72,6 +72,8 @@ class Simulator(Component):
         super().__init__("simulator")
         values = declare(self, PARAMETERS)
         self.components = checked_components(values["components"])
+        if "recorder" not in self.components and values["record"] not in ("", OFF):
+            raise SbsError(f"parameter record = {values['record']!r}: not allowed without the component recorder")
         self.aircraft = Aircraft.load(values["aircraft"])
         self._fidelity = {"lead_lag": values["lead_lag"], "cyclic_inflow": values["cyclic_inflow"]}
         simulation = self._start(values)
@@ -149,6 +151,7 @@ class Simulator(Component):
 
     def _on_reset(self, request: Reset.Request, response: Reset.Response) -> Reset.Response:
         def reset() -> None:
+            check_reset(request)
             if request.from_state:
                 self.loop.reset(request.state, self.loop.swashplate())
                 return
@@ -187,6 +190,20 @@ class Simulator(Component):
                 self.log.end()
             except SbsError as error:
                 self.get_logger().error(str(error))
+
+
+def check_reset(request: Reset.Request) -> None:
+    """Raise SimulationError for a request with a part that would not be used."""
+    if not request.from_state:
+        if len(request.state):
+            raise SimulationError(f"state: {len(request.state)} values, allowed with from_state = true only")
+        return
+    position = point_array(request.position)
+    unused = {name: getattr(request, name) for name in ("airspeed", "climb_rate", "sideslip", "turn_rate", "heading")}
+    unused |= {f"position.{axis}": float(value) for axis, value in zip("xyz", position, strict=True)}
+    for name, value in unused.items():
+        if value != 0.0:
+            raise SimulationError(f"{name} = {value:g}: not allowed with from_state = true, the state has its own")
 
 
 def checked_components(names: list[str]) -> tuple[str, ...]:

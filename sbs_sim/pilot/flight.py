@@ -1,7 +1,7 @@
 """Flights with a pilot in the loop, as fast as they compute: the mixer and the simulation as the nodes run them."""
 
 import collections
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from sbs_sim.errors import PilotError
 from sbs_sim.mixer import Mixer
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import Simulation, histories, trimmed_state
+from sbs_sim.simulation import History, Simulation, history, trimmed_state
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def fly(
     wind: Wind | None = None,
     delay: int = 0,
     **options: Any,
-) -> Mapping[str, Array]:
+) -> History:
     """Fly for a while with a pilot who sees every state.
 
     Parameters
@@ -52,8 +52,8 @@ def fly(
 
     Returns
     -------
-    dict of str to ndarray
-        See `simulate`; "controls" are those of the pilot.
+    History
+        See `simulate`; "controls" are those of the pilot, and `warnings` has what the mixer clipped, too.
 
     Raises
     ------
@@ -78,16 +78,17 @@ def fly(
     given = [_asked(pilot, 0.0, state)]
     mixer.set_target(given[0])
     simulation = Simulation(aircraft, state, mixer.move(0.0), wind=wind, **options)
-    snapshots = []
+    snapshots, clipped = [], dict[str, None]()
     for tick in range(round(duration / simulation.tick) + 1):
         if tick > 0:
             simulation.advance()
             given.append(_asked(pilot, simulation.time, simulation.state))
         waiting.append(given[-1])
         mixer.set_target(waiting.popleft() if len(waiting) > delay else waiting[0])
+        clipped |= dict.fromkeys(f"clipped: {text}" for text in mixer.saturated)
         simulation.set_swashplate(mixer.move(simulation.time))
         snapshots.append(simulation.snapshot())
-    return histories(aircraft, snapshots, given)
+    return history(aircraft, snapshots, given, clipped)
 
 
 def _asked(pilot: Callable[[float, Array], ArrayLike], time: float, state: Array) -> Array:

@@ -242,6 +242,8 @@ def _wind(topic: Topic, i: int) -> Wind:
         name: tuple(float(topic[f"wind.{name}.{axis}"][i]) for axis in "xyz") for name in WIND_VECTORS
     }
     fields |= {name: float(topic[f"wind.{name}"][i]) for name in WIND_NUMBERS}
+    if fields["gust_duration"] == 0.0:  # older logs may name the peak of a gust that there was not
+        fields["gust"] = (0.0, 0.0, 0.0)
     return Wind(**fields, turbulence_seed=int(topic["wind.turbulence_seed"][i]))
 
 

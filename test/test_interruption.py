@@ -1,0 +1,98 @@
+"""Ctrl-C in calls of the library that would take hours, and in threads of theirs."""
+
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+
+import psutil
+import pytest
+
+from sbs_sim import interruption, simulate_batch
+from sbs_sim.batch import Case
+from sbs_sim.interruption import InterruptedCallError
+from sbs_sim.parallel import compute
+
+PATIENCE = 60.0  # s, generous, for machines that are busy
+CODE = """
+    import threading
+    import numpy as np
+    from sbs_sim import Aircraft, Case, simulate, simulate_batch, sweep
+
+    aircraft = Aircraft.load("sbs").with_values({"environment.air_density": 0.0, "environment.gravity": 0.0})
+    at_rest = np.zeros(aircraft.layout.size)
+    at_rest[3] = 1.0
+    pull = [0.1, 0.0, 0.0, 0.0]
+    calls = {
+        "simulate": lambda: simulate(aircraft, at_rest, pull, 1e4),
+        "a long tick": lambda: simulate(aircraft, at_rest, pull, 1e5, tick=1.0, azimuth_step=0.026),
+        "batch": lambda: simulate_batch(
+            [Case(aircraft, at_rest, pull)] * 50, 1e6, workers=2, every=10**8, outputs=["u"]
+        ),
+        "sweep": lambda: sweep(Aircraft.load("sbs"), "airspeed", np.linspace(0.0, 20.0, 100_000), workers=2),
+    }
+    print("begun", flush=True)
+    try:
+        calls[CALL]()
+    except KeyboardInterrupt:
+        print("interrupted", [thread.name for thread in threading.enumerate()])
+"""
+
+
+@pytest.mark.parametrize("call", ["simulate", "a long tick", "batch", "sweep"])
+def test_ctrl_c_ends_what_would_take_hours(call):
+    code = textwrap.dedent(CODE).replace("CALL", repr(call))
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "begun\n"
+        watched, end = psutil.Process(process.pid), time.monotonic() + PATIENCE
+        before = watched.cpu_times().user
+        while watched.cpu_times().user < before + 0.3:  # it is at work
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=PATIENCE)
+    assert out == "interrupted ['MainThread']\n"
+
+
+def test_calls_at_work_end_where_they_look_and_those_that_wait_do_not_begin(sbs):
+    begun, ended = [], []
+
+    def work(_, number):
+        begun.append(number)
+        try:
+            while True:
+                interruption.look()
+                time.sleep(0.001)
+        except InterruptedCallError:
+            ended.append(number)
+            raise
+
+    def asked():
+        if len(begun) == 2:
+            raise KeyboardInterrupt
+        return False
+
+    with pytest.raises(KeyboardInterrupt):
+        compute(work, [(sbs, i) for i in range(5)], lambda *_: None, workers=2, cancelled=asked)
+    assert sorted(begun) == sorted(ended) == [0, 1]
+
+
+def test_an_error_of_the_caller_ends_the_flights_too(sbs, hover):
+    def progress(*_):
+        raise RuntimeError("of the caller")
+
+    with pytest.raises(RuntimeError, match="of the caller"):
+        simulate_batch([Case(sbs, hover), *[Case(sbs, hover)] * 20], 0.05, workers=2, progress=progress)
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("sbs_sim")]
+
+
+def test_nobody_is_interrupted_without_being_asked():
+    interruption.look()
+    asked = threading.Event()
+    assert interruption.until(asked, lambda value: (interruption.look(), value)[1], 5) == 5
+    asked.set()
+    with pytest.raises(InterruptedCallError):
+        interruption.until(asked, interruption.look)
+    interruption.look()

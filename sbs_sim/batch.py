@@ -3,6 +3,8 @@
 Every flight is what `simulate` would give, to the last bit, whatever number of threads or workers fly them.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import inspect
 import itertools
 import math
@@ -20,6 +22,7 @@ from sbs_sim.analysis.trim import TrimPoint, trim
 from sbs_sim.content import ByContent
 from sbs_sim.errors import BatchError, SbsError
 from sbs_sim.model import state as S
+from sbs_sim.model.frames import euler_angles
 from sbs_sim.model.wind import Wind
 from sbs_sim.parallel import checked_workers, compute
 from sbs_sim.simulation import Commands, fly_commands
@@ -98,6 +101,8 @@ class Batch(ByContent):
     def __getitem__(self, name: str) -> Array:
         """History of a name, shape (n_flights, n_rows, ...); NaN after the end of a flight.
 
+        With "state" also those of single states, and of "psi", "theta", "phi" [rad].
+
         Raises
         ------
         KeyError
@@ -107,7 +112,11 @@ class Batch(ByContent):
             return self.histories[name]
         if "state" in self.histories and name in self.state_names:
             return self.histories["state"][:, :, self.state_names.index(name)]
-        known = [*self.histories, *(self.state_names if "state" in self.histories else ())]
+        if "state" in self.histories and name in S.EULER_NAMES:
+            attitude = self.histories["state"][:, :, S.ATTITUDE : S.VELOCITY]
+            angles = euler_angles(attitude.reshape(-1, 4))[:, S.EULER_NAMES.index(name)]
+            return angles.reshape(attitude.shape[:2])
+        known = [*self.histories, *((*self.state_names, *S.EULER_NAMES) if "state" in self.histories else ())]
         raise KeyError(f"no {name!r}: there are {', '.join(known)}")
 
     def percentiles(self, name: str, shares: Sequence[float] = (5.0, 25.0, 50.0, 75.0, 95.0)) -> Array:
@@ -143,7 +152,7 @@ def simulate_batch(
     workers: int | None = None,
     progress: Callable[[int, int, int], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
-    dask: "str | distributed.Client | None" = None,
+    dask: str | distributed.Client | None = None,
     memory: float = MEMORY,
     **options: Any,
 ) -> Batch:

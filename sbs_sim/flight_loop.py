@@ -4,6 +4,8 @@ The thread spends its time in compiled code without the GIL or asleep. All that 
 reset, wind, pause, step) is put in a mailbox and carried out between two ticks, so a tick is never disturbed.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import collections
 import contextlib
 import math

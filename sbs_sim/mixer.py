@@ -4,6 +4,8 @@ Swashplate angles are `Rotor.mixing` times the pilot controls (paper section 2.1
 are clipped to their ranges, swashplate angles to theirs, and each angle moves no faster than its actuator.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import math
 
 import numpy as np

@@ -5,7 +5,7 @@ steps. Steps are counted in integers from the start, and time is step x dt, so t
 give the same flight to the last bit.
 """
 
-from __future__ import annotations  # so that `help` shows the names of types and not what they stand for
+from __future__ import annotations  # `help` then shows types by their names
 
 import collections
 import math

@@ -4,6 +4,8 @@ Two constructions of the same matrices. `averaged` takes central differences of 
 azimuth. `paper` builds them term by term as the paper's eqs. [20] to [34] do, with its blocks by name.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -128,7 +130,7 @@ class LinearModel(ByContent):
                 return mode
         raise KeyError(f"no mode {name!r}: there are {', '.join(mode.name for mode in self.modes)}")
 
-    def quasi_static(self, kept: Sequence[str] = S.LINEAR_BODY_NAMES) -> "LinearModel":
+    def quasi_static(self, kept: Sequence[str] = S.LINEAR_BODY_NAMES) -> LinearModel:
         """Model in which all states but the kept ones have settled: A_ss - A_sf A_ff^-1 A_fs and so on.
 
         Parameters
@@ -211,6 +213,11 @@ class LinearModel(ByContent):
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain lists and numbers for JSON, see `sbs_sim.analysis.export.model_to_dict`."""
         return export.model_to_dict(self)
+
+    def _repr_html_(self) -> str:
+        from sbs_sim.notebook import model_html
+
+        return model_html(self)
 
 
 def linearize(

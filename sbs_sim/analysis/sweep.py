@@ -3,6 +3,8 @@
 Every point is solved for itself, from hover, so that neither the number of workers nor the other points change it.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -37,6 +39,7 @@ QUANTITIES = {  # of a trim, beside its states
     **ROTOR_LOADS,
     **dict.fromkeys(("residual", "iterations"), "1"),
 }
+ALSO = {"psi": "rad", S.AIRSPEED: "m/s"}  # not among the columns of a table
 CANCELLED = "cancelled"
 
 
@@ -108,7 +111,7 @@ class Sweep:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """What `sweep[name]` knows: attitude, controls, loads of the rotors, residual, iterations, states."""
+        """What `sweep[name]` knows beside "psi" and "V": attitude, controls, loads, residual, iterations, states."""
         states: dict[str, None] = {}
         for point in self.points:
             if point.trim is not None:
@@ -117,7 +120,7 @@ class Sweep:
 
     def unit(self, name: str) -> str:
         """Unit of what `sweep[name]` has, and of the parameter; "1" for a plain number, empty where it is not known."""
-        known = CONDITIONS | QUANTITIES | dict(zip(S.LINEAR_BODY_NAMES, S.LINEAR_BODY_UNITS, strict=True))
+        known = CONDITIONS | QUANTITIES | ALSO | dict(zip(S.LINEAR_BODY_NAMES, S.LINEAR_BODY_UNITS, strict=True))
         if name in known:
             return known[name]
         if name not in self.names:
@@ -131,8 +134,8 @@ class Sweep:
         Parameters
         ----------
         name : str
-            "pitch", "roll" [rad]; a control [rad]; "thrust" [N], "torque" [N m], "power" [W]; "residual",
-            "iterations"; a linear state in its unit.
+            "pitch", "roll" [rad]; "residual", "iterations"; a linear state in its unit, "theta" and "phi" among them;
+            a control, "psi", "V", "thrust", "torque", "power" as in `TrimPoint`.
 
         Returns
         -------
@@ -143,8 +146,8 @@ class Sweep:
         KeyError
             There is none; the message lists those that there are.
         """
-        if name not in self.names:
-            raise KeyError(f"no {name!r}: there are {', '.join(self.names)}")
+        if name not in (*self.names, *ALSO):
+            raise KeyError(f"no {name!r}: there are {', '.join((*self.names, *ALSO))}")
         rows = [_quantity(point.trim, name) for point in self.points]
         if name in ROTOR_LOADS:
             return _filled(rows, max(len(row) for row in rows))
@@ -192,6 +195,11 @@ class Sweep:
         ]
         return {"parameter": self.parameter, "points": points}
 
+    def _repr_html_(self) -> str:
+        from sbs_sim.notebook import sweep_html
+
+        return sweep_html(self)
+
 
 Progress = Callable[[SweepPoint, int, int], None]
 
@@ -212,7 +220,7 @@ def sweep(
     workers: int | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
-    dask: "str | distributed.Client | None" = None,
+    dask: str | distributed.Client | None = None,
 ) -> Sweep:
     """Trim, and linearize, along one parameter.
 
@@ -312,11 +320,9 @@ def _quantity(point: TrimPoint | None, name: str) -> Array:
     """Values of a name in a trim, shape (n,) with n = 1 for what is not of a rotor; empty without a trim."""
     if point is None:
         return np.empty(0)
-    if name in S.CONTROL_NAMES:
-        return point.controls[[S.CONTROL_NAMES.index(name)]]
-    if name in QUANTITIES:
-        return np.atleast_1d(np.asarray(getattr(point, name), dtype=float))
-    return point.state[[i for i, own in enumerate(point.state_names) if own == name]]
+    if name in point:
+        return np.atleast_1d(np.asarray(point[name], dtype=float))
+    return np.atleast_1d(np.asarray(getattr(point, name, []), dtype=float))
 
 
 def _filled(rows: Sequence[NDArray[Any]], width: int) -> NDArray[Any]:

@@ -5,6 +5,7 @@ the six body accelerations, of the flap and lag accelerations and of the inflow 
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,6 +39,7 @@ LIMITS = {
 }
 BODY_STEP, ROTOR_STEP = 1e-5, 1e-6  # of the differences: m/s, rad/s, rad; rad, inflow ratio
 JACOBIAN_AZIMUTHS = 4  # enough to say where to go, the residual says where to stop
+ROTOR_LOADS = ("thrust", "torque", "power")
 MOTION = [S.LINEAR_U, S.LINEAR_V, S.LINEAR_W, S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]
 
 
@@ -148,6 +150,51 @@ class TrimPoint(ByContent):
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain lists and numbers for JSON, by the names of the attributes, with "control_names"."""
         return trim_to_dict(self)
+
+    def keys(self) -> tuple[str, ...]:
+        """What `point[name]` knows."""
+        return (*S.CONTROL_NAMES, *ROTOR_LOADS, "psi", S.AIRSPEED, *self.state_names)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.keys()
+
+    def __getitem__(self, name: str) -> Any:
+        """Value of a name.
+
+        Parameters
+        ----------
+        name : str
+            A state, "theta" and "phi" among them; a control [rad]; "psi", the heading, which is 0 [rad]; "V", the speed
+            relative to the air [m/s]; "thrust" [N], "torque" [N m], "power" [W].
+
+        Returns
+        -------
+        float, of thrust, torque and power ndarray of shape (n_rotors,)
+
+        Raises
+        ------
+        KeyError
+            There is none; the message lists those that there are.
+        """
+        if name in self.state_names:
+            return float(self.state[self.state_names.index(name)])
+        if name in S.CONTROL_NAMES:
+            return float(self.controls[S.CONTROL_NAMES.index(name)])
+        if name in ROTOR_LOADS:
+            return getattr(self, name)
+        if name == S.AIRSPEED:
+            return math.hypot(self.condition.airspeed, self.condition.climb_rate)
+        if name == "psi":
+            return 0.0
+        raise KeyError(f"no {name!r}: there are {', '.join(self)}")
+
+    def _repr_html_(self) -> str:
+        from sbs_sim.notebook import trim_html
+
+        return trim_html(self)
 
 
 class TrimProblem:

@@ -5,6 +5,8 @@ reads it as an array of cells, one 64-byte row per cell with the coefficients of
 laid out over three turns of the angle so that nothing has to be wrapped.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,6 +4,8 @@ Euler angles are yaw, pitch, roll (psi, theta, phi), applied in that order. A qu
 takes body components to earth components; R_NB is the same as a matrix.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import math
 
 import numpy as np

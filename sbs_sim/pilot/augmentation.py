@@ -4,6 +4,8 @@ Designed like the hover hold from the linear model (rotors settled, a lag of eve
 what it does not feed back it does not see. So speeds and place are the pilot's, and attitude follows the sticks.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import math
 from dataclasses import dataclass
 

@@ -1,5 +1,7 @@
 """Flights with a pilot in the loop, as fast as they compute: the mixer and the simulation as the nodes run them."""
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import collections
 from collections.abc import Callable
 from typing import Any

@@ -8,6 +8,8 @@
 4. The result is checked with all 38 states, sampled at every tick, its controls one tick late.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -76,7 +78,7 @@ class HoverModel(ByContent):
     roll: float
 
     @classmethod
-    def of(cls, model: LinearModel) -> "HoverModel":
+    def of(cls, model: LinearModel) -> HoverModel:
         """Take it from a linear model.
 
         Raises
@@ -90,7 +92,7 @@ class HoverModel(ByContent):
         )
 
     @classmethod
-    def checked(cls, condition: Any, *values: Any) -> "HoverModel":
+    def checked(cls, condition: Any, *values: Any) -> HoverModel:
         """Take the attributes in their order, if the condition of their trim is hover.
 
         Raises

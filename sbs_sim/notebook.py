@@ -1,0 +1,112 @@
+"""Trims, linear models and sweeps as HTML, which notebooks show in place of their text. All text is escaped."""
+
+import math
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sbs_sim.model.state import CONTROL_NAMES
+
+if TYPE_CHECKING:
+    from sbs_sim.analysis.linearize import LinearModel
+    from sbs_sim.analysis.sweep import Sweep, SweepPoint
+    from sbs_sim.analysis.trim import TrimPoint
+
+MOST_ROWS = 100  # of a sweep: half of them from its beginning, half from its end
+NUMBERS = "text-align:right;font-variant-numeric:tabular-nums"
+
+
+def trim_html(point: "TrimPoint") -> str:
+    """Attitude, controls and loads of a trim."""
+    angles = [("pitch", point.pitch), ("roll", point.roll), *zip(CONTROL_NAMES, point.controls, strict=True)]
+    rows = [[f"{name} [deg]", _fixed(math.degrees(value), 4)] for name, value in angles]
+    for name, unit, values in (("thrust", "N", point.thrust), ("power", "W", point.power)):
+        rows.append([f"{name} [{unit}]", " + ".join(_fixed(value, 2) for value in values)])
+    return _paragraph(f"Trim: {_condition(point)}") + _table(["", ""], rows) + _told(point)
+
+
+def model_html(model: "LinearModel") -> str:
+    """Modes of a linear model."""
+    rows = [
+        [
+            mode.name,
+            _pole(mode.pole),
+            _fixed(mode.frequency, 4),
+            _fixed(mode.damping, 4),
+            _seconds(mode.time_to_half),
+            _seconds(mode.time_to_double),
+        ]
+        for mode in model.modes
+    ]
+    size = f"{len(model.state_names)} states, {len(model.control_names)} controls, {len(model.output_names)} outputs"
+    heading = _paragraph(f"Linear model, {model.method}, {size}: {_condition(model.trim)}")
+    columns = ["mode", "pole [rad/s]", "frequency [rad/s]", "damping", "half [s]", "double [s]"]
+    return heading + _table(columns, rows) + _told(model.trim)
+
+
+def sweep_html(found: "Sweep") -> str:
+    """Trims and growing modes along a sweep."""
+    shown, unit = found.shown
+    columns = [f"{found.parameter} [{unit}]" if unit else found.parameter, "pitch [deg]", "roll [deg]"]
+    columns += [f"{name} [deg]" for name in CONTROL_NAMES] + ["power [W]", "growing modes", ""]
+    rows = [_sweep_row(value, point) for value, point in zip(shown, found.points, strict=True)]
+    if len(rows) > MOST_ROWS:
+        half = MOST_ROWS // 2
+        rows = [*rows[:half], [f"… {len(rows) - 2 * half} more …", *[""] * (len(columns) - 1)], *rows[-half:]]
+    failed = f", {len(found.failed)} of them without a result" if found.failed else ""
+    return _paragraph(f"Sweep of {found.parameter}: {len(found.points)} points{failed}") + _table(columns, rows, (8, 9))
+
+
+def _sweep_row(value: float, point: "SweepPoint") -> list[str]:
+    if point.trim is None:
+        return [f"{value:.6g}", *["–"] * 7, "", point.error or ""]
+    angles = np.degrees([point.trim.pitch, point.trim.roll, *point.trim.controls])
+    growing = [mode.name for mode in point.model.modes if mode.pole.real > 0.0] if point.model else []
+    told = [*([point.error] if point.error else []), *point.trim.beyond_limits, *point.warnings]
+    cells = [*(_fixed(angle, 3) for angle in angles), _fixed(point.trim.power.sum(), 1)]
+    return [f"{value:.6g}", *cells, "; ".join(growing), "; ".join(told)]
+
+
+def _condition(point: "TrimPoint") -> str:
+    given = point.condition
+    angles = f"sideslip {math.degrees(given.sideslip):g} deg, turn {math.degrees(given.turn_rate):g} deg/s"
+    left_out = [
+        name for name, there in (("lead-lag", point.lead_lag), ("cyclic inflow", point.cyclic_inflow)) if not there
+    ]
+    without = f"; without {', '.join(left_out)}" if left_out else ""
+    return f"airspeed {given.airspeed:g} m/s, climb {given.climb_rate:g} m/s, {angles}{without}"
+
+
+def _told(point: "TrimPoint") -> str:
+    lines = [f"beyond its limits: {line}" for line in point.beyond_limits]
+    return "".join(map(_paragraph, [*lines, *(f"outside the model's validity: {line}" for line in point.warnings)]))
+
+
+def _pole(pole: complex) -> str:
+    return f"{_fixed(pole.real, 5)}" + (f" ± {_fixed(abs(pole.imag), 5)} i" if pole.imag else "")
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.4f}" if math.isfinite(time) else ""
+
+
+def _fixed(value: Any, digits: int) -> str:
+    return f"{round(float(value), digits) + 0.0:.{digits}f}"
+
+
+def _paragraph(text: str) -> str:
+    return f"<p>{escape(text)}</p>"
+
+
+def _table(headings: Sequence[str], rows: Iterable[Sequence[str]], texts: Sequence[int] = (0,)) -> str:
+    """A table with texts in some of its columns and numbers in the others."""
+    head = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
+    body = "".join(f"<tr>{_cells(row, texts)}</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _cells(row: Sequence[str], texts: Sequence[int]) -> str:
+    styles = ("text-align:left" if i in texts else NUMBERS for i in range(len(row)))
+    return "".join(f'<td style="{style}">{escape(cell)}</td>' for style, cell in zip(styles, row, strict=True))

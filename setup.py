@@ -1,5 +1,7 @@
 """Build script of the ament_python package sbs_sim; colcon calls it."""
 
+import shutil
+import sys
 from pathlib import Path
 
 from setuptools import find_packages, setup
@@ -17,6 +19,54 @@ def config_files():
     return sorted(entries.items())
 
 
+# What the library and its commands import; the versions are those of Ubuntu 24.04, for which ROS 2 Jazzy is made. ROS
+# itself cannot be named here: its packages are in package.xml.
+REQUIREMENTS = [
+    "jsonschema>=4.10",
+    "matplotlib>=3.6",
+    "mcap>=1.1",
+    "mcap-ros2-support>=0.5",
+    "numba>=0.58",
+    "numpy>=1.26",
+    "ruamel.yaml>=0.17.21",
+    "scipy>=1.11",
+    "tqdm>=4.66",
+    "zstandard>=0.22",
+]
+# Each with what it is for, which `./run --help` tells.
+EXECUTABLES = [
+    "simulator = sbs_sim.nodes.executables:simulator",  # fly in real time
+    "control_mixer = sbs_sim.nodes.executables:control_mixer",  # pilot controls to swashplates
+    "analysis = sbs_sim.nodes.executables:analysis",  # trims, linear models and sweeps as services
+    "hover_hold = sbs_sim.nodes.executables:hover_hold",  # keep place and heading
+    "teleop = sbs_sim.nodes.executables:teleop",  # fly by the keyboard
+    "joystick = sbs_sim.nodes.executables:joystick",  # fly by a gamepad or transmitter
+    "replay = sbs_sim.nodes.executables:replay",  # publish, check, repair or fly again a log
+    "cockpit = sbs_sim.nodes.executables:cockpit",  # fly in the browser
+    "trim = sbs_sim.commands.trim:main",  # trim an aircraft
+    "linearize = sbs_sim.commands.linearize:main",  # linear model of a steady flight, with its modes
+    "sweep = sbs_sim.commands.sweep:main",  # trims and modes along one parameter
+    "batch = sbs_sim.commands.batch:main",  # Monte Carlo: many flights through turbulence
+    "reproduce = sbs_sim.commands.reproduce:main",  # the paper's results beside ours
+    "gusts = sbs_sim.commands.gusts:main",  # the hover hold, and how it holds in turbulence and gusts
+    "plot = sbs_sim.commands.plot:main",  # draw a log over time
+]
+# colcon puts the executables where `ros2 run` finds them, in lib/sbs_sim. A wheel puts all into the PATH, where names
+# such as `plot` belong to nobody: it brings one command for all of them.
+IS_WHEEL = not {"bdist_wheel", "dist_info", "editable_wheel"}.isdisjoint(sys.argv)
+# What is left of making a wheel must not lie where ./run would take it for what colcon has installed.
+WHEEL_FOLDER = Path("build/wheel")
+
+
+def own_folder():
+    """Options that keep what pip has made in a folder of its own; none for colcon, which says where to."""
+    if not IS_WHEEL and (sys.argv[1:2] != ["egg_info"] or "--egg-base" in sys.argv):
+        return {}
+    shutil.rmtree(WHEEL_FOLDER, ignore_errors=True)  # modules that are no more
+    WHEEL_FOLDER.mkdir(parents=True)
+    return {"egg_info": {"egg_base": str(WHEEL_FOLDER)}, "build": {"build_base": str(WHEEL_FOLDER)}}
+
+
 setup(
     name=PACKAGE,
     version="0.1.0",
@@ -32,26 +82,13 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
         *config_files(),
     ],
-    install_requires=["setuptools"],
-    extras_require={"dask": ["distributed"]},  # sweeps and batches on a cluster
-    zip_safe=False,
-    entry_points={
-        "console_scripts": [
-            "simulator = sbs_sim.nodes.executables:simulator",
-            "control_mixer = sbs_sim.nodes.executables:control_mixer",
-            "analysis = sbs_sim.nodes.executables:analysis",
-            "hover_hold = sbs_sim.nodes.executables:hover_hold",
-            "teleop = sbs_sim.nodes.executables:teleop",
-            "joystick = sbs_sim.nodes.executables:joystick",
-            "replay = sbs_sim.nodes.executables:replay",
-            "cockpit = sbs_sim.nodes.executables:cockpit",
-            "trim = sbs_sim.commands.trim:main",
-            "linearize = sbs_sim.commands.linearize:main",
-            "sweep = sbs_sim.commands.sweep:main",
-            "batch = sbs_sim.commands.batch:main",
-            "reproduce = sbs_sim.commands.reproduce:main",
-            "gusts = sbs_sim.commands.gusts:main",
-            "plot = sbs_sim.commands.plot:main",
-        ],
+    install_requires=REQUIREMENTS,
+    extras_require={
+        "dask": ["distributed"],  # sweeps and batches on a cluster
+        "control": ["control"],  # LinearModel.to_control
+        "pandas": ["pandas"],  # to_pandas of a topic
     },
+    zip_safe=False,
+    options=own_folder(),
+    entry_points={"console_scripts": ["sbs-sim = sbs_sim.commands.main:main"] if IS_WHEEL else EXECUTABLES},
 )

@@ -1,5 +1,6 @@
 """docs/reference: the pages say what the interfaces, parameters, command lines and docstrings say."""
 
+import argparse
 import re
 import sys
 from pathlib import Path
@@ -55,8 +56,9 @@ def test_every_option_is_told():
         parser = reference.parser_of(module)
         if parser is not None:
             _, _, section = written("commands").partition(f"\n## {name}\n")
-            for option in parser._option_string_actions:
-                assert option in {"-h", "--help"} or f"`{option}" in section.split("\n## ")[0], option
+            for option, action in parser._option_string_actions.items():
+                if action.help != argparse.SUPPRESS and option not in {"-h", "--help", "--version"}:
+                    assert f"`{option}" in section.split("\n## ")[0], option
 
 
 def test_comments_are_not_taken_for_markdown():

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import shutil
 import stat
 import subprocess
@@ -89,7 +90,8 @@ def assert_one_line(result, *parts):
 def test_help_names_the_executables(clone):
     result = clone.call("--help")
     assert result.returncode == 0
-    assert f"executables: {EXECUTABLES}\n" in result.stdout
+    listed = re.findall(r"^  (\w+) +(\w.+)$", result.stdout.partition("\nexecutables:\n")[2], re.MULTILINE)
+    assert [name for name, _ in listed] == EXECUTABLES.split()
     assert all(f"./run {command}" in result.stdout for command in ("build", "test", "shell", "python"))
 
 
@@ -99,14 +101,36 @@ def test_without_arguments_it_says_how_to_call_it(clone):
     assert "usage:" in result.stderr
 
 
-@pytest.mark.parametrize("name", ["simulater", "sim", "simulator.py", "*", ""])
-def test_unknown_executable_is_told_without_building(clone, name):
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("simulater", "simulator"),
+        ("sim", "simulator"),
+        ("tirm", "trim"),
+        ("buidl", "build"),
+        ("hoverhold", "hover_hold"),
+        ("simulator.py", ""),
+        ("*", ""),
+        ("a b", ""),
+        ("", ""),
+    ],
+)
+def test_unknown_executable_is_told_without_building(clone, name, meant):
     result = clone.call(name)
     assert result.returncode == 2
     if name:
-        assert result.stderr == f'run: no executable "{name}"; there are: {EXECUTABLES}\n'
+        near = f"did you mean {meant}? " if meant else ""
+        assert result.stderr == f'run: no executable "{name}"; {near}there are: {EXECUTABLES}\n'
     assert not (clone.folder / ".venv").exists()
     assert not (clone.folder / "log").exists()
+
+
+def test_version_and_completion_need_nothing(clone):
+    assert clone.call("--version").stdout == "sbs_sim 0.1.0\n"
+    printed = clone.call("completion").stdout
+    path = shlex.split(printed)
+    assert path == ["source", str(clone.folder / "config" / "completion.bash")]  # a folder with a blank in its name
+    assert not (clone.folder / ".venv").exists()
 
 
 def test_called_through_a_link(clone, tmp_path):

@@ -12,12 +12,11 @@ import importlib
 import itertools
 import re
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-
+from sbs_sim.nodes.endpoints import Endpoint, endpoints, quality
 from sbs_sim.nodes.host import Parameter
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -25,18 +24,6 @@ REFERENCE = ROOT / "docs" / "reference"
 INTERFACES = ROOT / "msg_defs"
 NOTE = "<!-- Made by tools/update_reference.py: do not edit. -->"
 
-# Which nodes a file of sbs_sim/nodes makes publishers, subscriptions and services for.
-PILOTS = ("hover_hold", "teleop", "joystick")
-NODES = {
-    "simulator": ("simulator",),
-    "outputs": ("simulator",),
-    "control_mixer": ("control_mixer",),
-    "analysis": ("analysis",),
-    "recording": ("recorder",),
-    "pilot": PILOTS,
-    "hover_hold": ("hover_hold",),
-    "joystick": ("joystick",),
-}
 PARAMETERS = ("simulator", "control_mixer", "analysis", "hover_hold", "teleop", "joystick")
 # What the definitions of others leave unsaid.
 MEANINGS = {
@@ -152,51 +139,6 @@ def entries(part: Part, place: str) -> str:
 # --- topics and services ----------------------------------------------------------------------------------------
 
 
-@dataclass
-class Endpoint:
-    """A publisher, subscription, service or action in the source of a node."""
-
-    role: str
-    type: str
-    name: str
-    qos: QoSProfile | None
-    nodes: tuple[str, ...]
-
-
-ROLES = {
-    "Topic": "publisher",
-    "create_publisher": "publisher",
-    "create_subscription": "subscription",
-    "create_service": "service",
-    "ThreadedActionServer": "action",
-}
-
-
-def endpoints() -> Iterator[Endpoint]:
-    """All that the nodes make under a fixed name."""
-    for file, nodes in NODES.items():
-        module = importlib.import_module(f"sbs_sim.nodes.{file}")
-        tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
-        for call in ast.walk(tree):
-            if not isinstance(call, ast.Call):
-                continue
-            called = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
-            names = [item.value for item in call.args if isinstance(item, ast.Constant) and isinstance(item.value, str)]
-            if called not in ROLES or not names:
-                continue
-            values = [getattr(module, item.id, None) for item in call.args if isinstance(item, ast.Name)]
-            kind = next(value for value in values if isinstance(value, type))
-            qos = next((value for value in values if isinstance(value, QoSProfile)), None)
-            yield Endpoint(ROLES[called], f"{kind.__module__.split('.')[0]}/{kind.__name__}", names[0], qos, nodes)
-
-
-def quality(qos: QoSProfile) -> str:
-    """A QoS profile in words."""
-    reliable = "reliable" if qos.reliability == ReliabilityPolicy.RELIABLE else "best effort"
-    latched = ", latched (transient local)" if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL else ""
-    return f"{reliable}, keep last {qos.depth}{latched}"
-
-
 def nodes_of(found: list[Endpoint], role: str) -> str:
     """The nodes with a role, each once."""
     names = dict.fromkeys(node for item in found if item.role == role for node in item.nodes)
@@ -310,10 +252,16 @@ def parameters() -> str:
 
 # --- commands ---------------------------------------------------------------------------------------------------
 
+ALL, SUPPRESSED = ("help", "version"), argparse.SUPPRESS
 COMMANDS_TEXT = """
 `./run NAME` is the same as `ros2 run sbs_sim NAME`. Errors are one line and exit code 1, a wrong command line is 2,
-Ctrl-C 130 where there is something to be cut short. Executables without a command line of their own take ROS arguments:
-their parameters are in [Parameters](parameters.md).
+Ctrl-C 130 where there is something to be cut short. Each has `--version`, and `--help`, which of nodes tells topics,
+services and parameters. Executables without a command line of their own take ROS arguments: their parameters are in
+[Parameters](parameters.md). Outside of ROS the package brings one command for all of them, `sbs-sim NAME`.
+
+The same words stand for the same things everywhere: `--set PATH=VALUE` changes the aircraft, `--out` is where the main
+result goes, `--csv` and `--json` hold it all in SI units and radians. Angles are typed in degrees, their names end in
+`deg`; parameters, messages and services of ROS are in radians, as REP 103 has it, but for those that end in `_deg`.
 """
 
 
@@ -344,7 +292,7 @@ def options(parser: argparse.ArgumentParser) -> str:
     """Arguments and options, group by group."""
     rows = []
     for group in parser._action_groups:
-        chosen = [action for action in group._group_actions if action.dest != "help"]
+        chosen = [action for action in group._group_actions if action.dest not in ALL and action.help != SUPPRESSED]
         rows += [option_row(parser, action) for action in chosen]
     return table(["argument", "meaning"], rows)
 

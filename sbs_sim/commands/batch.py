@@ -4,7 +4,7 @@ import argparse
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from sbs_sim.command_line import assignment
+from sbs_sim.command_line import Parser, assignment
 from sbs_sim.commands.common import (
     OUTSIDE,
     add_flight_arguments,
@@ -29,10 +29,11 @@ def main() -> int:
     return execute(make_parser(), _work)
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Command line of `batch`."""
-    parser = argparse.ArgumentParser(
-        prog="batch",
+    parser = Parser(
+        "batch",
+        example="batch --flights 200 --turbulence 1.5 --spread body.mass=0.05 --csv flights.csv",
         description="Fly many flights through turbulence, hands off: each is trimmed, keeps the controls of its trim,"
         " and has gusts of its own. On all cores or on a cluster.",
     )

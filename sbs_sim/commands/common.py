@@ -7,14 +7,13 @@ import argparse
 import io
 import math
 import os
-import re
 import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from sbs_sim.command_line import assignment
+from sbs_sim.command_line import Parser, assignment
 from sbs_sim.errors import SbsError
 
 if TYPE_CHECKING:
@@ -24,25 +23,19 @@ if TYPE_CHECKING:
 DEGREES = 180.0 / math.pi
 INTERRUPTED = 130
 OUTSIDE = "outside the model's validity"
-# What may follow an option without being one itself; argparse of Python up to 3.13 knows no exponents.
-NEGATIVE_NUMBER = re.compile(r"-((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|inf|infinity|nan)", re.IGNORECASE)
 
 
 class UsageError(Exception):
     """A command line that argparse cannot know to be wrong."""
 
 
-def execute(
-    parser: argparse.ArgumentParser, work: Callable[[argparse.Namespace], None], arguments: Sequence[str] | None = None
-) -> int:
+def execute(parser: Parser, work: Callable[[argparse.Namespace], None], arguments: Sequence[str] | None = None) -> int:
     """Parse the command line and work; the exit code of the process.
 
     Errors of this package are one line on stderr and the code 1; a wrong command line is argparse's and 2.
     """
     _behave_on_a_terminal()
-    parser._negative_number_matcher = NEGATIVE_NUMBER
-    # intermixed: options may stand between the arguments
-    parsed = parser.parse_intermixed_args(arguments)
+    parsed = parser.parse_args(arguments)
     try:
         work(parsed)
         sys.stdout.flush()
@@ -76,7 +69,7 @@ def _end_when_interrupted() -> None:
 # --- arguments --------------------------------------------------------------------------------------------------
 
 
-def add_aircraft_arguments(parser: argparse.ArgumentParser) -> None:
+def add_aircraft_arguments(parser: Parser) -> None:
     """Aircraft and changes of it."""
     group = parser.add_argument_group("aircraft")
     group.add_argument("--aircraft", default="sbs", metavar="NAME", help="name or file (default: sbs)")
@@ -91,7 +84,7 @@ def add_aircraft_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_flight_arguments(parser: argparse.ArgumentParser) -> None:
+def add_flight_arguments(parser: Parser) -> None:
     """Aircraft, flight condition and fidelity."""
     add_aircraft_arguments(parser)
     group = parser.add_argument_group("flight condition, relative to the air")

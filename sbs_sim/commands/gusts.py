@@ -4,6 +4,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
+from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import (
     DEGREES,
     OUTSIDE,
@@ -33,10 +34,11 @@ def main() -> int:
     return execute(make_parser(), _work)
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Command line of `gusts`."""
-    parser = argparse.ArgumentParser(
-        prog="gusts",
+    parser = Parser(
+        "gusts",
+        example="gusts --limit forward=0.3 --limit heading_deg=5",
         description="Design the hover hold, print its gains, poles and margins, and fly it in turbulence and in"
         " 1-cosine gusts, with the nonlinear model.",
     )
@@ -62,7 +64,7 @@ def make_parser() -> argparse.ArgumentParser:
         default=[],
         type=_limit,
         metavar="NAME=VALUE",
-        help="departure that costs as much as any other at its limit, such as forward=0.3 [m, s, rad];"
+        help="departure that costs as much as any other at its limit, such as forward=0.3 [m, m/s] or heading_deg=5;"
         " may be given several times",
     )
     parser.add_argument("--json", metavar="FILE", help="write the results")
@@ -71,8 +73,9 @@ def make_parser() -> argparse.ArgumentParser:
 
 def _limit(text: str) -> tuple[str, float]:
     name, _, value = text.partition("=")
+    plain = name.removesuffix("_deg")
     try:
-        return name, float(value)
+        return plain, float(value) if plain == name else math.radians(float(value))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r}: allowed is NAME=VALUE, for example forward=0.3") from None
 

@@ -4,6 +4,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
+from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import (
     add_flight_arguments,
     aircraft,
@@ -37,9 +38,13 @@ def main() -> int:
     return execute(make_parser(), _work)
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Command line of `linearize`."""
-    parser = argparse.ArgumentParser(prog="linearize", description="Linearize an aircraft and print its modes.")
+    parser = Parser(
+        "linearize",
+        example="linearize --airspeed 10 --floquet --out model.npz",
+        description="Linearize an aircraft and print its modes.",
+    )
     add_flight_arguments(parser)
     group = parser.add_argument_group("linear model")
     group.add_argument(
@@ -59,7 +64,8 @@ def make_parser() -> argparse.ArgumentParser:
         ("--floquet", "print the characteristic exponents of the periodic model beside the averaged poles"),
     ):
         group.add_argument(name, action="store_true", help=meaning)
-    group.add_argument("--export", metavar="FILE", help="write the model to a .npz, .mat or .json file")
+    group.add_argument("--out", metavar="FILE", help="write the model to a .npz, .mat or .json file")
+    parser.hidden(group, "--export", "--out")
     group.add_argument("--json", metavar="FILE", help="write the model to this file as JSON, in SI units and radians")
     return parser
 
@@ -68,14 +74,14 @@ def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.analysis.export import ENCODERS, check_target, to_json, write
     from sbs_sim.analysis.linearize import linearize
 
-    check_target(arguments.export, ENCODERS)
+    check_target(arguments.out, ENCODERS)
     check_target(arguments.json)
     craft = aircraft(arguments)
     full = linearize(craft, **flight(arguments), method=arguments.method)
     model = full.quasi_static() if arguments.quasi_static else full
     _print_model(craft, model)
-    if arguments.export:
-        model.save(arguments.export)
+    if arguments.out:
+        model.save(arguments.out)
     if arguments.json:
         write(arguments.json, to_json(model.to_dict()))
     if arguments.participation:

@@ -4,6 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import execute
 
 
@@ -12,9 +13,13 @@ def main() -> None:
     sys.exit(execute(make_parser(), _work))
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Command line of `plot`."""
-    parser = argparse.ArgumentParser(prog="plot", description="Draw a recorded flight over time.")
+    parser = Parser(
+        "plot",
+        example="plot bags/hover_step.mcap --out hover_step.html",
+        description="Draw a recorded flight over time.",
+    )
     parser.add_argument("file", type=Path, help="MCAP log")
     parser.add_argument(
         "--out",

@@ -4,6 +4,7 @@ import argparse
 import textwrap
 from typing import TYPE_CHECKING
 
+from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import execute, print_table
 from sbs_sim.progress import progress_bar
 
@@ -19,10 +20,11 @@ def main() -> int:
     return execute(make_parser(), _work)
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Command line of `reproduce`."""
-    parser = argparse.ArgumentParser(
-        prog="reproduce",
+    parser = Parser(
+        "reproduce",
+        example="reproduce --out report",
         description="Compute the paper's Tables 1 to 5, its inflow poles and its trims, and print them beside the"
         " printed values, with their ratios; remarks say why something differs.",
     )

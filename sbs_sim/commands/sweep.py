@@ -4,6 +4,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
+from sbs_sim.command_line import Parser, suggestion
 from sbs_sim.commands.common import (
     DEGREES,
     OUTSIDE,
@@ -17,10 +18,11 @@ from sbs_sim.commands.common import (
     print_table,
     radians,
 )
-from sbs_sim.errors import SbsError, SweepError
+from sbs_sim.errors import AircraftError, SbsError, SweepError
 from sbs_sim.progress import progress_bar
 
 if TYPE_CHECKING:
+    from sbs_sim.aircraft import Aircraft
     from sbs_sim.analysis.sweep import Sweep, SweepPoint
 
 # As they are typed, and the names of `sbs_sim.analysis.sweep`; all other parameters are paths.
@@ -38,11 +40,12 @@ def main() -> int:
     return execute(make_parser(), _work)
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Command line of `sweep`."""
-    parser = argparse.ArgumentParser(
-        prog="sweep",
-        usage="sweep PARAMETER (START STOP COUNT | --values X [X ...]) [options]",
+    parser = Parser(
+        "sweep",
+        example="sweep airspeed -5 20 41 --out plots --csv sweep.csv",
+        usage="%(prog)s PARAMETER (START STOP COUNT | --values X [X ...]) [options]",
         description="Trim and linearize an aircraft along one parameter, on all cores or on a cluster.",
     )
     parser.add_argument(
@@ -79,6 +82,7 @@ def _work(arguments: argparse.Namespace) -> None:
     check_target(arguments.csv)
     check_target(arguments.json)
     craft = aircraft(arguments)
+    _check_parameter(craft, arguments.parameter, typed)
     with progress_bar(" points", len(values)) as progress:
         found = sweep(
             craft,
@@ -102,6 +106,24 @@ def _work(arguments: argparse.Namespace) -> None:
             print(f"written: {path}")
     if len(found.failed) == len(found.points):
         raise SweepError("no point of the sweep has a trim")
+
+
+def _check_parameter(craft: "Aircraft", given: str, typed: str) -> None:
+    """Raise SweepError for what is no parameter, with those that can be typed."""
+    if typed in TYPED:
+        return
+    try:
+        craft.value(given)
+    except AircraftError as error:
+        near = suggestion(typed, [*TYPED, *(f"{part}.{key}" for part, key in _keys(craft))])
+        allowed = f"allowed are {', '.join(TYPED)} or a path{near}"
+        raise SweepError(f"parameter {given!r}: {allowed}; {error}") from None
+
+
+def _keys(craft: "Aircraft") -> list[tuple[str, str]]:
+    """Parts of the aircraft file with their keys."""
+    parts = {name: part for name, part in craft.data.items() if isinstance(part, dict)}
+    return [(name, key) for name, part in {**parts, "rotors": craft.data["rotors"][0]}.items() for key in part]
 
 
 def _values(arguments: argparse.Namespace) -> list[float]:

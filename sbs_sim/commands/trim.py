@@ -3,6 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
+from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import (
     DEGREES,
     add_flight_arguments,
@@ -25,9 +26,13 @@ def main() -> int:
     return execute(make_parser(), _work)
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Command line of `trim`."""
-    parser = argparse.ArgumentParser(prog="trim", description="Trim an aircraft and print the steady flight.")
+    parser = Parser(
+        "trim",
+        example="trim --airspeed 15 --set body.mass=22",
+        description="Trim an aircraft and print the steady flight.",
+    )
     add_flight_arguments(parser)
     parser.add_argument(
         "--method",

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import rclpy.utilities
 
+from sbs_sim.command_line import Parser
 from sbs_sim.errors import SbsError
 from sbs_sim.nodes.host import DISCOVERY, Component, run
 
@@ -42,9 +43,11 @@ class Simulator:
     """
 
     def __init__(self, ros_arguments: list[str], end: threading.Event) -> None:
-        path = Path(sys.argv[0]).resolve().with_name("simulator")
+        program = Path(sys.argv[0]).resolve()
+        beside = program.with_name("simulator")
+        path = [str(beside)] if beside.exists() else [str(program), "simulator"]  # as `sbs-sim cockpit` there is one
         height = ["--ros-args", "-p", f"altitude:={START_HEIGHT}"]  # first: what the user says comes after
-        command = [sys.executable, str(path), *height, *ros_arguments[1:]]
+        command = [sys.executable, *path, *height, *ros_arguments[1:]]
         # a session of its own: Ctrl-C comes to the cockpit, which ends the simulator when it has let go of it
         self._process = subprocess.Popen(command, start_new_session=True, preexec_fn=_end_with_parent)
         self._end = end
@@ -153,10 +156,10 @@ def checked_folder(name: str) -> Path:
     return folder
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Command line of `cockpit`."""
-    parser = argparse.ArgumentParser(
-        prog="cockpit",
+    parser = Parser(
+        "cockpit",
         description="Fly in the browser: starts a simulator and serves a page that shows and steers it.",
         epilog="What follows --ros-args goes to the simulator too: ./run cockpit --ros-args -p airspeed:=15.0",
     )

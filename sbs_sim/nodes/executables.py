@@ -3,76 +3,83 @@
 They import next to nothing, so that Ctrl-C is obeyed at once while the compiled model is still being loaded.
 """
 
+import importlib
 import os
 import signal
+import sys
+
+from sbs_sim import command_line
 
 INTERRUPTED = 128 + signal.SIGINT  # exit code of what was not meant to run until Ctrl-C
+OWN_COMMAND_LINE = ("replay", "cockpit")
+ROS = ("rclpy", "_msgs", "_srvs", "_interfaces", "ament_index_python")
 # The matrices are small: threads of numpy and scipy would gain nothing, and take the cores that the flight needs.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def simulator() -> None:
     """Run the executable `simulator`."""
-    _end_at_once_when_interrupted()
-    from sbs_sim.nodes.simulator import main
-
-    main()
+    _run("simulator")
 
 
 def control_mixer() -> None:
     """Run the executable `control_mixer`."""
-    _end_at_once_when_interrupted()
-    from sbs_sim.nodes.control_mixer import main
-
-    main()
+    _run("control_mixer")
 
 
 def analysis() -> None:
     """Run the executable `analysis`."""
-    _end_at_once_when_interrupted()
-    from sbs_sim.nodes.analysis import main
-
-    main()
+    _run("analysis")
 
 
 def hover_hold() -> None:
     """Run the executable `hover_hold`."""
-    _end_at_once_when_interrupted()
-    from sbs_sim.nodes.hover_hold import main
-
-    main()
+    _run("hover_hold")
 
 
 def teleop() -> None:
     """Run the executable `teleop`."""
-    _end_at_once_when_interrupted()
-    from sbs_sim.nodes.teleop import main
-
-    main()
+    _run("teleop")
 
 
 def joystick() -> None:
     """Run the executable `joystick`."""
-    _end_at_once_when_interrupted()
-    from sbs_sim.nodes.joystick import main
-
-    main()
+    _run("joystick")
 
 
 def replay() -> None:
     """Run the executable `replay`."""
-    _end_at_once_when_interrupted(INTERRUPTED)
-    from sbs_sim.nodes.replay import main
-
-    main()
+    _run("replay", INTERRUPTED)
 
 
 def cockpit() -> None:
     """Run the executable `cockpit`."""
-    _end_at_once_when_interrupted()
-    from sbs_sim.nodes.cockpit import main
+    _run("cockpit")
 
-    main()
+
+def _run(name: str, interrupted: int = 0) -> None:
+    _end_at_once_when_interrupted(interrupted)
+    words = sys.argv[1:]
+    own = words[: words.index("--ros-args")] if "--ros-args" in words else words
+    if "--version" in own:
+        print(command_line.version_line())
+        return
+    try:
+        if {"-h", "--help"} & set(own):
+            print(importlib.import_module("sbs_sim.nodes.usage").text(name), end="")
+            return
+        module = importlib.import_module(f"sbs_sim.nodes.{name}")
+    except ModuleNotFoundError as error:
+        if not (error.name or "").partition(".")[0].endswith(ROS):
+            raise
+        print(
+            f"{name} needs ROS 2 and the package sbs_msgs: {error}; remedy: source them, or use ./run", file=sys.stderr
+        )
+        sys.exit(1)
+    if own and name not in OWN_COMMAND_LINE:
+        print(importlib.import_module("sbs_sim.nodes.usage").unknown_argument(name, own), file=sys.stderr)
+        sys.exit(2)
+    module.main()
 
 
 def _end_at_once_when_interrupted(code: int = 0) -> None:

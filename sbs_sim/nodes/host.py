@@ -24,6 +24,7 @@ from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from sbs_sim.aircraft import config_folder
+from sbs_sim.command_line import suggestion
 from sbs_sim.errors import SbsError
 
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
@@ -184,7 +185,8 @@ def declare(node: Node, parameters: dict[str, Parameter]) -> dict[str, Any]:
     known = {*parameters, "use_sim_time", "start_type_description_service"}
     for name in given:
         if name not in known and not name.startswith("qos_overrides"):
-            raise SbsError(f"parameter {name}: unknown, allowed are {', '.join(parameters)}")
+            near = suggestion(name, parameters)
+            raise SbsError(f"parameter {name}: unknown, allowed are {', '.join(parameters)}{near}")
     return {name: _declare_one(node, name, parameter, given) for name, parameter in parameters.items()}
 
 

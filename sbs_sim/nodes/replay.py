@@ -31,7 +31,7 @@ from std_srvs.srv import SetBool
 
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.command_line import assignment
+from sbs_sim.command_line import Parser, assignment
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
 from sbs_sim.nodes.executables import INTERRUPTED
@@ -52,6 +52,7 @@ LONGEST_DELAY = 3600.0  # s
 EMPTY = "structure_needs_at_least_one_member"
 # of which every node may be a publisher
 SHARED = frozenset(("/rosout", "/parameter_events", "/diagnostics", "/tf", "/tf_static"))
+NEWER, OLDER = ("--set", "--out"), ("--with", "--output")  # names of the same options
 PLAYING = ("rate", "start", "end", "loop", "topics", "delay")
 ROUNDING = 1e-6  # s
 LOOK_PERIOD = 0.05  # s between looks at who else is there
@@ -423,7 +424,7 @@ def main(args: list[str] | None = None) -> None:
         options = _parse(own_arguments(args))
         if options.recover:
             signal.signal(signal.SIGINT, signal.default_int_handler)  # what is half written is to be taken away
-            sys.exit(_recover(options.file, options.output))
+            sys.exit(_recover(options.file, options.out))
         if options.verify:
             sys.exit(_verify(options.file))
         if options.changes:
@@ -436,14 +437,18 @@ def main(args: list[str] | None = None) -> None:
         sys.exit(1)
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Command line of `replay`."""
-    parser = argparse.ArgumentParser(prog="replay", description="Publish, check, repair or fly again a log.")
+    parser = Parser(
+        "replay",
+        example="replay bags/hover_step.mcap --rate 0.5",
+        description="Publish, check, repair or fly again a log.",
+    )
     parser.add_argument("file", type=Path, help="MCAP log")
     parser.add_argument("--rate", type=float, default=1.0, help="recorded time over wall time, 0.001 to 1000")
     parser.add_argument("--start", type=float, default=0.0, help="where to begin [s after the first message]")
     parser.add_argument(
-        "--end", type=float, default=float("inf"), help="where to end [s after the first message]; with --with too"
+        "--end", type=float, default=float("inf"), help="where to end [s after the first message]; with --set too"
     )
     parser.add_argument("--loop", action="store_true", help="begin again at the end")
     parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, all if not given; after FILE")
@@ -457,29 +462,38 @@ def make_parser() -> argparse.ArgumentParser:
     one.add_argument("--verify", action="store_true", help="fly the log again and compare every state bit for bit")
     one.add_argument("--recover", action="store_true", help="rewrite a truncated or damaged log")
     one.add_argument(
-        "--with", dest="changes", action="append", metavar="KEY=VALUE", help="fly the commands with a changed aircraft"
+        "--set",
+        dest="changes",
+        action="append",
+        metavar="PATH=VALUE",
+        help="fly the commands with a changed aircraft: body.mass=25; may be given several times, and is then checked"
+        " together",
     )
+    parser.hidden(one, OLDER[0], NEWER[0])
     parser.add_argument(
-        "--output",
+        "--out",
         default="",
+        metavar="FILE",
         help="log to write, a file or a folder (default: FILE.recovered.mcap, or one named after the time)",
     )
+    parser.hidden(parser, OLDER[1], NEWER[1])
     return parser
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
     parser = make_parser()
     options = parser.parse_args(arguments)
-    _check(parser, options)
+    _check(parser, options, OLDER if set(OLDER) & set(arguments) else NEWER)
     return options
 
 
-def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """End with a usage error where options are out of range or do not go together."""
-    modes = {"--verify": options.verify, "--recover": options.recover, "--with": options.changes}
+def _check(parser: Parser, options: argparse.Namespace, spelled: tuple[str, str]) -> None:
+    """End with a usage error where options are out of range or do not go together, by the names that were typed."""
+    change, out = spelled
+    modes = {"--verify": options.verify, "--recover": options.recover, change: options.changes}
     for mode in (mode for mode, wanted in modes.items() if wanted):
         for name in PLAYING:
-            if getattr(options, name) != parser.get_default(name) and (mode, name) != ("--with", "end"):
+            if getattr(options, name) != parser.get_default(name) and (mode, name) != (change, "end"):
                 parser.error(f"--{name}: not allowed with {mode}")
     if not 1.0 / LARGEST_RATE <= options.rate <= LARGEST_RATE:
         parser.error(f"--rate {options.rate}: allowed are {1 / LARGEST_RATE:g} to {LARGEST_RATE:g}")
@@ -487,8 +501,8 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
         parser.error(f"--delay {options.delay}: allowed are 0 to {LONGEST_DELAY:g}")
     if not 0.0 <= options.end <= float("inf"):
         parser.error(f"--end {options.end}: allowed is 0 or more")
-    if options.output and not (options.recover or options.changes):
-        parser.error("--output: allowed with --recover and --with")
+    if options.out and not (options.recover or options.changes):
+        parser.error(f"{out}: allowed with --recover and {change}")
     if not 0.0 <= options.start <= options.end:
         parser.error(f"--start {options.start}: allowed are 0 to --end")
 
@@ -580,7 +594,7 @@ def _fly_with(options: argparse.Namespace) -> int:
     stop = threading.Event()  # an exception would be lost in the callbacks of the compiler
     signal.signal(signal.SIGINT, lambda *_: stop.set())
     with progress_bar("step") as progress:
-        path, steps = fly_with(flight, options.changes, last, Path(options.output), stop, progress)
+        path, steps = fly_with(flight, options.changes, last, Path(options.out), stop, progress)
     print(f"{path}: {steps} of {last - first} steps")
     return 0
 

@@ -10,6 +10,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from sbs_sim.errors import RecordingError
+from sbs_sim.recording.log import require_something
 from sbs_sim.recording.scan import Content, DamageError, Extent, Scan, Source, chunk_at, open_recording, run_at, scan
 
 Entry = tuple[int, int, int, int, bytes]  # log time [ns], place of the chunk and in it, channel, data
@@ -56,6 +57,7 @@ class Playback:
     def _all(self) -> Scan:
         found = scan(self._source, lambda content: None)
         if not found.complete:
+            require_something(self._source, found)  # else nothing could be saved
             raise RecordingError(
                 f"{self.path} is not whole ({found.reasons[0]}): `replay --recover {self.path}` saves what is"
             )

@@ -1,0 +1,112 @@
+# Completion for bash: source this file, or evaluate what `./run completion` or `sbs-sim completion` prints.
+# Made by tools/make_completion.py: do not edit.
+# shellcheck shell=bash disable=SC2207  # no completion has blanks in it
+
+_sbs_sim_names='simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep batch reproduce gusts plot'
+_sbs_sim_own='build test shell python completion --help --version'
+_sbs_sim_aircraft='sbs sbs_paper'
+_sbs_sim_conditions='airspeed climb_rate sideslip_deg turn_rate_deg'
+_sbs_sim_paths='environment.air_density environment.kinematic_viscosity environment.gravity environment.speed_of_sound body.mass body.inertia body.flat_plate_areas options.coupling options.hub_moment options.flap_inertia options.elements controls.collective.range_deg controls.lateral_cyclic.range_deg controls.longitudinal_cyclic.range_deg controls.differential_longitudinal_cyclic.range_deg rotors.name rotors.hub rotors.shaft_direction rotors.rotation rotors.speed_rpm rotors.radius rotors.blades rotors.blade_mass rotors.blade_cg rotors.hinge_offset rotors.flap_hinge_offset rotors.flap_spring rotors.lag_spring rotors.lag_damping rotors.pitch_flap_coupling rotors.pitch_lag_coupling rotors.chord.root rotors.chord.tip rotors.twist_deg.root rotors.twist_deg.tip rotors.root_cutout rotors.tip_loss rotors.swashplate_phase_deg rotors.airfoil rotors.duct_expansion rotors.collective_range_deg rotors.cyclic_range_deg rotors.swashplate_rate_deg rotors.mixing.collective.collective rotors.mixing.collective.lateral_cyclic rotors.mixing.collective.longitudinal_cyclic rotors.mixing.collective.differential_longitudinal_cyclic rotors.mixing.lateral_cyclic.collective rotors.mixing.lateral_cyclic.lateral_cyclic rotors.mixing.lateral_cyclic.longitudinal_cyclic rotors.mixing.lateral_cyclic.differential_longitudinal_cyclic rotors.mixing.longitudinal_cyclic.collective rotors.mixing.longitudinal_cyclic.lateral_cyclic rotors.mixing.longitudinal_cyclic.longitudinal_cyclic rotors.mixing.longitudinal_cyclic.differential_longitudinal_cyclic'
+
+_sbs_sim_options() {
+    case $1 in
+        'simulator' | 'control_mixer' | 'analysis' | 'hover_hold' | 'teleop' | 'joystick') echo '--help --version --ros-args' ;;
+        'replay') echo '--help --version --rate --start --end --loop --topics --delay --verify --recover --set --out' ;;
+        'cockpit') echo '--help --version --host --port --attach --logs' ;;
+        'trim') echo '--help --version --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --method --json' ;;
+        'linearize') echo '--help --version --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --method --quasi-static --matrices --derivatives --participation --floquet --out --json' ;;
+        'sweep') echo '--help --version --values --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --trims-only --workers --dask --out --csv --json' ;;
+        'batch') echo '--help --version --flights --duration --turbulence --length --seed --spread --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --workers --dask --every --out --csv --json' ;;
+        'reproduce') echo '--help --version --aircraft --paper-aircraft --json --out' ;;
+        'gusts') echo '--help --version --aircraft --set --wind --turbulence --length --gust --gust-duration --seed --duration --delay --limit --json' ;;
+        'plot') echo '--help --version --out' ;;
+    esac
+}
+
+_sbs_sim_follows() {
+    case $1 in
+        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'gusts --json' | 'plot' | 'plot --out') echo '@files' ;;
+        'replay --set' | 'trim --set' | 'linearize --set' | 'sweep --set' | 'batch --spread' | 'batch --set' | 'gusts --set') echo '@assigned' ;;
+        'trim --aircraft' | 'linearize --aircraft' | 'sweep --aircraft' | 'batch --aircraft' | 'reproduce --aircraft' | 'reproduce --paper-aircraft' | 'gusts --aircraft') echo '@aircraft' ;;
+        'trim --method') echo 'newton two_loop' ;;
+        'linearize --method') echo 'averaged paper' ;;
+        'sweep') echo '@paths' ;;
+    esac
+}
+
+_sbs_sim_parameters() {
+    case $1 in
+        'simulator' | 'cockpit') echo 'aircraft:= components:= airspeed:= climb_rate:= sideslip:= turn_rate:= heading:= altitude:= ground_altitude:= real_time_factor:= publish_rate:= azimuth_step_deg:= lead_lag:= cyclic_inflow:= command_timeout:= record:= wind:=' ;;
+        'control_mixer' | 'analysis') echo 'aircraft:=' ;;
+        'hover_hold') echo 'largest_distance:= patience:= position_limit:=' ;;
+        'teleop') echo 'aircraft:= augmentation:= expo:= collective_deg:= cyclic_deg:= differential_deg:=' ;;
+        'joystick') echo 'aircraft:= augmentation:= config:= pad:=' ;;
+    esac
+}
+
+_sbs_sim_words() {
+    COMPREPLY=($(compgen -W "$1" -- "$2"))
+}
+
+# What may follow an option, or stand as the first argument: words, or what a mark stands for.
+_sbs_sim_value() {
+    local word=$2
+    case $1 in
+        @files) compopt -o default ;;
+        @aircraft) compopt -o default; _sbs_sim_words "$_sbs_sim_aircraft" "$word" ;;
+        @paths) _sbs_sim_words "$_sbs_sim_conditions $_sbs_sim_paths" "$word" ;;
+        @assigned) compopt -o nospace; _sbs_sim_words "${_sbs_sim_paths// /= }=" "$word" ;;
+        *) _sbs_sim_words "$1" "$word" ;;
+    esac
+}
+
+# Completes the arguments of executable $1, whose name is word $2 of the line.
+_sbs_sim_arguments() {
+    local name=$1 place=$2 word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} ros='' i
+    [[ $before == '=' ]] && before=${COMP_WORDS[COMP_CWORD - 2]}
+    [[ $word == '=' ]] && word=''
+    for ((i = place + 1; i < COMP_CWORD; i++)); do
+        [[ ${COMP_WORDS[i]} == --ros-args ]] && ros=yes
+    done
+    if [[ -n $ros && ($before == -p || $before == --param) ]]; then
+        compopt -o nospace
+        _sbs_sim_words "$(_sbs_sim_parameters "$name")" "$word"
+    elif [[ -n $ros ]]; then
+        _sbs_sim_words '-p -r --params-file --log-level' "$word"
+    elif [[ -n $(_sbs_sim_follows "$name $before") ]]; then
+        _sbs_sim_value "$(_sbs_sim_follows "$name $before")" "$word"
+    elif [[ $word == -* ]]; then
+        _sbs_sim_words "$(_sbs_sim_options "$name")" "$word"
+    elif [[ -n $(_sbs_sim_follows "$name") ]]; then
+        _sbs_sim_value "$(_sbs_sim_follows "$name")" "$word"
+    fi
+}
+
+_sbs_sim() {
+    COMPREPLY=()
+    if ((COMP_CWORD == 1)); then
+        _sbs_sim_words "$_sbs_sim_names completion --help --version" "${COMP_WORDS[1]}"
+    else
+        _sbs_sim_arguments "${COMP_WORDS[1]}" 1
+    fi
+}
+
+# ./run of any clone; other programs of that name are left to what bash does without this.
+_sbs_sim_run() {
+    local script
+    COMPREPLY=()
+    script=$(readlink -f -- "${COMP_WORDS[0]}" 2>/dev/null)
+    if [[ ! -r ${script%/*}/config/completion.bash || ${COMP_WORDS[0]} != */* ]]; then
+        compopt -o default
+    elif ((COMP_CWORD == 1)); then
+        _sbs_sim_words "$_sbs_sim_names $_sbs_sim_own" "${COMP_WORDS[1]}"
+    else
+        case ${COMP_WORDS[1]} in
+            test | shell | python) compopt -o default ;;
+            *) _sbs_sim_arguments "${COMP_WORDS[1]}" 1 ;;
+        esac
+    fi
+}
+
+complete -F _sbs_sim sbs-sim
+complete -F _sbs_sim_run run

@@ -51,6 +51,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import the public names when they are first used: the compiler behind them takes its time."""
+    if name == "__version__":
+        return importlib.import_module("importlib.metadata").version("sbs_sim")
     if name in _HOME:
         return getattr(importlib.import_module(_HOME[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

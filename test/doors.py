@@ -872,7 +872,7 @@ OPTIONS = {
 }
 OPTIONS["linearize"] = {
     **OPTIONS["trim"],
-    "--export": TARGETS,
+    **dict.fromkeys(("--out", "--export"), TARGETS),
     "--matrices": None,
     "--quasi-static": None,
     "--derivatives": None,

@@ -363,6 +363,7 @@ def test_there_is_one_sweep_at_a_time(client):
         ({"parameter": "bank", "values": [1.0]}, "allowed are airspeed, climb_rate, sideslip, turn_rate"),
         ({"values": []}, "values"),
         ({"values": [1.0, math.nan]}, "values[1] = nan"),
+        ({"values": [1.0], "airspeed": 5.0}, "airspeed = 5.0: not allowed where airspeed is swept"),
         ({"values": [0.0] * 1001}, "values: 1001 of them, allowed are 1 to 1000"),
     ],
 )

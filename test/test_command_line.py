@@ -16,6 +16,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 import make_completion  # noqa: E402
 import update_reference as reference  # noqa: E402
 
+import sbs_sim  # noqa: E402
 from sbs_sim import Aircraft  # noqa: E402
 from sbs_sim.command_line import suggestion  # noqa: E402
 from sbs_sim.commands import gusts as gusts_command  # noqa: E402
@@ -81,6 +82,7 @@ def test_examples_are_such_that_the_executables_take_them():
 
 @pytest.mark.parametrize("name", ["simulator", "cockpit", "sweep"])
 def test_every_executable_knows_its_version(name):
+    assert sbs_sim.__version__ == "0.1.0"
     result = call(INSTALLED / name, "--version")
     assert (result.returncode, result.stdout, result.stderr) == (0, "sbs_sim 0.1.0\n", "")
 

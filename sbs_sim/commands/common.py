@@ -53,17 +53,27 @@ def execute(parser: Parser, work: Callable[[argparse.Namespace], None], argument
 
 def _behave_on_a_terminal() -> None:
     """No tracebacks for Ctrl-C (also while modules are imported), closed pipes, and characters that cannot be shown."""
-    # By a thread: Python's own handlers wait for the end of compiled code, and of compiling.
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    threading.Thread(target=_end_when_interrupted, name="interrupts", daemon=True).start()
+    signal.signal(signal.SIGINT, _leave)
+    if signal.getsignal(signal.SIGINT) is _leave:
+        # And by a thread: Python's own handlers wait for the end of compiled code, and of compiling.
+        told, tell = os.pipe()
+        os.set_blocking(tell, False)
+        signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
+        threading.Thread(target=_leave_when_told, args=(told,), name="interrupts", daemon=True).start()
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal may not know every character
 
 
-def _end_when_interrupted() -> None:
-    signal.sigwait({signal.SIGINT})
+def _leave(*_: Any) -> None:
     os._exit(INTERRUPTED)
+
+
+def _leave_when_told(told: int) -> None:
+    """Wait for the number of the signal, which the handler in C writes at once."""
+    while signal.SIGINT not in os.read(told, 16):
+        pass
+    _leave()
 
 
 # --- arguments --------------------------------------------------------------------------------------------------

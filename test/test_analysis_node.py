@@ -19,6 +19,7 @@ from sbs_msgs.action import Sweep  # noqa: E402
 from sbs_msgs.msg import BodyState, LinearModel, SimulationStatus, TrimPoint  # noqa: E402
 from sbs_msgs.srv import Linearize, Trim  # noqa: E402
 from sbs_sim import Aircraft, Simulation, linearize, trim  # noqa: E402
+from sbs_sim.analysis.linearize import growing_rotor_modes_text  # noqa: E402
 from sbs_sim.analysis.trim import TrimCondition  # noqa: E402
 from sbs_sim.flight_loop import FlightLoop  # noqa: E402
 from sbs_sim.model import state as S  # noqa: E402
@@ -202,6 +203,8 @@ def test_linearize_is_the_librarys(client, aircraft, request_fields):
     model = linearize(aircraft, **request_fields)
     assert bool(answer.model.blocks) == (request_fields.get("method") == "paper")
     check_model(answer.model, model)
+    growing = growing_rotor_modes_text(model, aircraft)
+    assert answer.message == ("linearized" if growing == "none" else f"linearized; growing rotor modes: {growing}")
 
 
 def test_clients_that_call_at_once_all_get_the_same(flight, client):

@@ -155,6 +155,16 @@ def test_linearize_prints_modes(sbs, tmp_path):
     assert json.loads((tmp_path / "model.json").read_text()) == model.to_dict()
 
 
+def test_linearize_tells_rotor_modes_that_grow():
+    """Lag without a damper, in the settled model too, which has no rotor states; nothing of the body."""
+    loose = ("linearize", "--airspeed", 20, "--set", "rotors.lag_damping=0")
+    for more in ((), ("--quasi-static",)):
+        assert re.search(
+            r"^growing rotor modes: \S+ lag, .* at 0\.\d+ ± 125\.\d+i rad/s \(MR1, MR2\)$", output(*loose, *more), re.M
+        )
+    assert "growing rotor modes: none\n" in output("linearize", "--set", "rotors.lag_damping=0.5")
+
+
 def test_linearize_prints_what_else_it_is_asked_for(sbs):
     text = output("linearize", "--method", "paper", "--matrices", "--derivatives", "--participation", "--floquet")
     model = linearize(sbs, method="paper")

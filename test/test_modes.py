@@ -2,16 +2,19 @@
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers import build
 
-from sbs_sim import linearize, trim
+from sbs_sim import Aircraft, linearize, sweep, trim
+from sbs_sim.analysis.linearize import growing_rotor_modes_text
 from sbs_sim.analysis.modes import first_matrix_modes, modes
 from sbs_sim.model.state import LINEAR_BODY_NAMES, StateLayout, part_of
 
 BODY_MODES = ["short period", "phugoid", "heave", "roll", "Dutch roll", "spiral"]
+PITCH_DIVERGES = ("10 m/s", "20 m/s")  # where M_w > 0
 CONDITIONS = {
     "hover": {},
     "hover, uniform inflow": {"cyclic_inflow": False},
@@ -21,6 +24,12 @@ CONDITIONS = {
     "turn": {"airspeed": 10.0, "turn_rate": 0.3},
     "sideways": {"airspeed": 6.0, "sideslip": math.pi / 2},
 }
+
+
+DATA = Path(__file__).resolve().parent / "data"
+LONGITUDINAL, LATERAL = {"u", "w", "q", "theta"}, {"v", "p", "phi", "r"}
+OF_LONGITUDINAL = ("phugoid", "short period", "heave", "pitch")
+OF_LATERAL = ("Dutch roll", "roll", "spiral", "yaw")
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +92,11 @@ def test_every_body_mode_is_there_once(models, name):
     found = [mode.name for mode in models[name].modes]
     assert len(set(found)) == len(found)
     if name != "turn":  # where the phugoid may be two real poles
-        body = [mode.split(" subsidence")[0].split(" divergence")[0] for mode in found]
-        assert [body.count(wanted) for wanted in BODY_MODES] == [1] * 6
+        wanted = [
+            mode.replace("heave", "pitch divergence" if name in PITCH_DIVERGES else "heave subsidence")
+            for mode in BODY_MODES
+        ]
+        assert [found.count(mode) for mode in wanted] == [1] * 6
 
 
 @pytest.mark.parametrize("name", ["hover", "hover, uniform inflow", "hover, flap only"])
@@ -110,6 +122,84 @@ def test_quasi_static_poles_have_the_names_of_the_full_ones(models):
         reduced = model.quasi_static()
         for mode in reduced.modes:
             assert mode.pole == pytest.approx(model.mode(mode.name).pole, rel=0.25, abs=0.1)
+
+
+def leading(mode, state_names):
+    """States with their shares, the largest first."""
+    return sorted(zip(state_names, mode.participation, strict=True), key=lambda item: -item[1])
+
+
+def halves(mode, state_names):
+    """Halves of the body, "longitudinal" and "lateral", that have the leading state or one that comes near to it."""
+    shares = dict(leading(mode, state_names))
+    largest = {
+        half: max(shares[name] for name in names)
+        for half, names in (("longitudinal", LONGITUDINAL), ("lateral", LATERAL))
+    }
+    return {half for half, share in largest.items() if share >= 0.8 * max(largest.values())}
+
+
+def said_halves(name):
+    """Halves of the body that a name speaks of."""
+    words = {"longitudinal": OF_LONGITUDINAL, "lateral": OF_LATERAL}
+    return {half for half, own in words.items() if any(name.startswith(word) or f"-{word}" in name for word in own)}
+
+
+@pytest.mark.parametrize("file", ["sbs", "tandem", "tail_rotor"])
+def test_names_agree_with_what_takes_part_most(sbs, file):
+    """Over the envelope, in strongly coupled flight too: family, rotor and half of the body."""
+    aircraft = sbs if file == "sbs" else Aircraft.load(DATA / f"{file}.yaml")
+    flights = [{"airspeed": speed} for speed in (-8.0, -4.0, -2.0, 0.0, 2.0, 5.0, 8.0, 15.0, 20.0)]
+    flights += [{"climb_rate": rate} for rate in (-1.5, 3.0)]
+    flights += [{"airspeed": 10.0, "turn_rate": 0.5}, {"airspeed": 6.0, "sideslip": -math.pi / 2}]
+    for flight in flights:
+        model = linearize(aircraft, **flight)
+        assert len({mode.name for mode in model.modes}) == len(model.modes)
+        for mode in model.modes:
+            part = part_of(leading(mode, model.state_names)[0][0])
+            assert mode.family == part.family, (flight, mode.name)
+            if part.family == "body":
+                assert mode.rotors == ()
+                assert said_halves(mode.name) & halves(mode, model.state_names), (flight, mode.name)
+            else:
+                assert part.rotor + 1 in mode.rotors, (flight, mode.name)
+                assert part.family in mode.name or (part.family == "flap" and "coning" in mode.name)
+
+
+def test_body_modes_of_a_helicopter_with_a_tail_rotor():
+    """In hover what grows is the phugoid, of u and theta before v and phi; with speed v and r are the Dutch roll."""
+    aircraft = Aircraft.load(DATA / "tail_rotor.yaml")
+    hover = linearize(aircraft)
+    growing = [mode for mode in hover.modes if mode.pole.real > 0.0]
+    assert [mode.name for mode in growing] == ["phugoid"]
+    assert {name for name, _ in leading(growing[0], hover.state_names)[:2]} == {"u", "theta"}
+    dutch_roll = hover.mode("Dutch roll")
+    assert {name for name, _ in leading(dutch_roll, hover.state_names)[:2]} == {"v", "phi"}
+    cruise = linearize(aircraft, airspeed=15.0)
+    assert {name for name, _ in leading(cruise.mode("Dutch roll"), cruise.state_names)[:2]} == {"v", "r"}
+    assert cruise.mode("Dutch roll").is_oscillatory
+    # weathercock stability makes its frequency: the root of N_v U
+    stiffness = cruise.derivatives()["N'_v"] * 15.0
+    assert cruise.mode("Dutch roll").frequency == pytest.approx(math.sqrt(stiffness), rel=0.1)
+    assert leading(cruise.mode("spiral"), cruise.state_names)[0][0] == "phi"
+    # flown backward it is unstable like an arrow with its feathers in front
+    backward = linearize(aircraft, airspeed=-10.0)
+    assert backward.derivatives()["N'_v"] * -10.0 < -1.0
+    assert backward.mode("yaw divergence").pole.real > 1.0
+
+
+def test_what_m_w_makes_diverge_is_pitch(models):
+    """Heave is damped (Z_w < 0); with M_w > 0 and speed the angle of attack runs away, as a pilot sees in pitch."""
+    for name in PITCH_DIVERGES:
+        model = models[name]
+        known = model.derivatives()
+        assert known["Z_w"] < 0.0 < known["M_w"]
+        mode = model.mode("pitch divergence")
+        assert not mode.is_oscillatory
+        # the short period's determinant Z_w M_q - M_w (U + Z_q) is the product of its two poles
+        determinant = known["Z_w"] * known["M_q"] - known["M_w"] * (model.trim.state[0] + known["Z_q"])
+        settled = [model.quasi_static().mode(own).pole.real for own in ("pitch divergence", "short period")]
+        assert math.prod(settled) == pytest.approx(determinant, rel=0.1)
 
 
 def longitudinal(m_u, m_q=-4.0, z_w=-0.5, m_w=0.0, u0=0.0):
@@ -160,6 +250,38 @@ def test_short_period_of_forward_flight_is_a_pair():
     real = names_of(longitudinal(0.02, m_q=-9.0, m_w=-0.01, u0=20.0))
     assert not real["short period"].is_oscillatory
     assert "heave subsidence" in real
+
+
+def test_heave_diverges_only_by_itself():
+    found = names_of(longitudinal(0.5, z_w=0.3))  # Z_w > 0: it climbs the more, the more it climbs
+    assert found["heave divergence"].pole == pytest.approx(0.3)
+    found = names_of(longitudinal(0.02, m_q=-2.0, m_w=0.5, u0=20.0))
+    assert found["pitch divergence"].pole.real > 1.0
+    assert not {"heave divergence", "heave subsidence"} & found.keys()
+    # hardly beyond neutral it is still pitch
+    found = names_of(longitudinal(0.0, m_q=-2.0, z_w=-0.5, m_w=0.06, u0=20.0))
+    assert 0.0 < found["pitch divergence"].pole.real < 0.1
+
+
+def test_a_nose_that_turns_away_from_the_wind_is_a_yaw_divergence():
+    a = longitudinal(0.5)
+    a[4, [4, 7]] = -0.2, -15.0  # v: the turning axes
+    a[5, 4] = -0.05  # p: less of a dihedral
+    a[7, [4, 7]] = -0.4, -1.0  # r: N_v < 0
+    found = names_of(a)
+    assert found["yaw divergence"].pole.real > 1.0
+    assert found["Dutch roll"].pole.real < -2.0
+    a[7, 4] = 0.4
+    found = names_of(a)
+    assert found["Dutch roll"].frequency == pytest.approx(math.sqrt(15.0 * 0.4), rel=0.1)
+    assert not any("divergence" in name for name in found)
+
+
+def test_heave_and_yaw_may_oscillate_together():
+    a = longitudinal(0.5)
+    a[1, [1, 7]] = -0.5, 0.4
+    a[7, [1, 7]] = -0.4, -0.5
+    assert names_of(a)["heave-yaw"].pole == pytest.approx(-0.5 + 0.4j)
 
 
 # -- names of the rotors' modes --------------------------------------------------------------------------------------
@@ -217,6 +339,78 @@ def test_one_rotor_of_its_own_has_its_number(sbs):
     aircraft = build(rotors=[{}, {"speed_rpm": 2000.0}])
     found = {mode.name for mode in linearize(aircraft).modes}
     assert {"coning, rotor 1", "coning, rotor 2", "advancing lag, rotor 2"} <= found
+
+
+def tail_rotor(**changes):
+    """The helicopter with a tail rotor, whose tail rotor has other values."""
+    aircraft = Aircraft.load(DATA / "tail_rotor.yaml")
+    for key, value in changes.items():
+        aircraft = aircraft.with_value(f"rotors.tail.{key}", value)
+    return aircraft
+
+
+def check_ranks(aircraft):
+    """Cyclic modes of every rotor are at |nu - n| and nu + n of its own revolutions, nu by its collective modes."""
+    model = linearize(aircraft)
+    for number, rotor in enumerate(aircraft.rotors, 1):
+        for family, collective in (("flap", "coning"), ("lag", "collective lag")):
+            own = {mode.name: mode for mode in model.modes if (mode.family, mode.rotors) == (family, (number,))}
+            assert len(own) == 1 + 2 * ((rotor.blades - 1) // 2) + (rotor.blades % 2 == 0)
+            nu = abs(own[f"{collective}, rotor {number}"].pole) / rotor.speed
+            for n in range(1, (rotor.blades - 1) // 2 + 1):
+                suffix = f"{family} {n}" if n > 1 else family
+                slow, fast = (own[f"{way} {suffix}, rotor {number}"] for way in ("regressing", "advancing"))
+                # the hub takes part in the first harmonic, whose frequency it moves
+                assert abs(fast.pole) / rotor.speed == pytest.approx(nu + n, rel=0.12)
+                assert abs(slow.pole) / rotor.speed == pytest.approx(abs(nu - n), abs=0.12 * (nu + n))
+                assert fast.pole.imag > slow.pole.imag
+    return model
+
+
+def test_rotor_modes_are_ranked_within_their_own_rotor():
+    """The main rotor's advancing lag is slower than the regressing one of the tail rotor, which turns faster."""
+    model = check_ranks(tail_rotor())
+    main, tail = model.mode("advancing lag, rotor 1"), model.mode("regressing lag, rotor 2")
+    assert main.pole.imag == pytest.approx(399.2, abs=0.5)  # 1.59 of its 251.3 rad/s
+    assert tail.pole.imag == pytest.approx(498.2, abs=0.5)  # 0.53 of its 942.5 rad/s
+
+
+@pytest.mark.parametrize("blades", [3, 4, 5])
+@pytest.mark.parametrize("rotation", [1, -1])
+def test_rotor_modes_of_a_tail_rotor_of_any_speed(blades, rotation):
+    """Slower too, where its regressing flap is beyond one per revolution (nu > 2), and where poles of both cross."""
+    large = {"radius": 0.25, "hub": [-1.2, 0.0, -0.1], "chord.root": 0.04, "chord.tip": 0.04}  # holds at 2000 rpm too
+    for rpm in (1500.0, 2000.0, 2400.0, 5000.0):
+        check_ranks(tail_rotor(blades=blades, rotation=rotation, speed_rpm=rpm, **large))
+    for rpm in (4000.0, 7190.0, 9000.0):
+        check_ranks(tail_rotor(blades=blades, rotation=rotation, speed_rpm=rpm))
+
+
+def test_loci_follow_the_rotors():
+    """The tail rotor's poles go with its speed through the main rotor's, which stay."""
+    found = sweep(tail_rotor(), "rotors.tail.speed_rpm", np.linspace(6000.0, 9000.0, 9), workers=1)
+    main, tail = found.loci["advancing lag, rotor 1"].imag, found.loci["regressing lag, rotor 2"].imag
+    np.testing.assert_allclose(main, main[0], rtol=1e-3)
+    np.testing.assert_allclose(tail / found.values, tail[0] / found.values[0], rtol=0.02)
+    assert tail[0] < main[0] < tail[-1]
+
+
+def test_growing_rotor_modes_are_told(sbs):
+    """Lag without a damper grows somewhere at speed, with one nowhere; what grows of the body is not a rotor's."""
+    loose, damped = (linearize(sbs.with_value("rotors.lag_damping", value), airspeed=15.0) for value in (0.0, 0.5))
+    assert any(mode.pole.real > 0.0 for mode in damped.modes)
+    assert damped.growing_rotor_modes == ()
+    assert growing_rotor_modes_text(damped, sbs) == "none"
+    growing = [mode for mode in loose.modes if mode.pole.real > 0.0 and "lag" in mode.name]
+    assert list(loose.growing_rotor_modes) == growing != []
+    text = growing_rotor_modes_text(loose, sbs)
+    assert text == f"{growing[0].name} at {growing[0].pole.real:.3g} ± {growing[0].pole.imag:.5g}i rad/s (MR1, MR2)"
+    assert loose.to_dict()["growing_rotor_modes"] == [growing[0].name]
+    # pitch that follows lag drives it, in the rotor without a damper
+    driven = sbs.with_value("rotors.lag_damping", 0.0).with_value("rotors.MR1.lag_damping", 0.5)
+    own = linearize(driven.with_value("rotors.MR2.pitch_lag_coupling", 0.3))
+    assert [mode.rotors for mode in own.growing_rotor_modes] == [(2,)]
+    assert growing_rotor_modes_text(own, driven).endswith(" rad/s (MR2)")
 
 
 @pytest.mark.parametrize(("blades", "extra"), [(4, "differential"), (5, "regressing flap 2")])

@@ -175,8 +175,9 @@ def model_to_dict(model: "LinearModel", with_trim: bool = True) -> dict[str, Any
     Returns
     -------
     dict
-        With "poles" as {"real", "imag"} [rad/s], and "modes" as mappings with name, real, imag [rad/s], frequency
-        [rad/s], damping, period, time_to_half, time_to_double [s, None where there is none], participation.
+        With "poles" as {"real", "imag"} [rad/s], and "modes" as mappings with name, family, rotors, real, imag [rad/s],
+        frequency [rad/s], damping, period, time_to_half, time_to_double [s, None where there is none], participation;
+        "growing_rotor_modes" has the names of those.
     """
     contents = {name: value for name, value in _contents(model).items() if not name.startswith("mode_")}
     if not with_trim:
@@ -217,8 +218,9 @@ def _trim_contents(point: "TrimPoint") -> dict[str, Any]:
 
 def _mode_contents(mode: "Mode") -> dict[str, Any]:
     names = ("frequency", "damping", "period", "time_to_half", "time_to_double", "participation")
-    pole = {"name": mode.name, "real": mode.pole.real, "imag": mode.pole.imag}
-    return pole | {name: getattr(mode, name) for name in names}
+    named = {"name": mode.name, "family": mode.family, "rotors": mode.rotors}
+    pole = {"real": mode.pole.real, "imag": mode.pole.imag}
+    return {**named, **pole, **{name: getattr(mode, name) for name in names}}
 
 
 def _contents(model: "LinearModel") -> dict[str, Any]:
@@ -231,6 +233,7 @@ def _contents(model: "LinearModel") -> dict[str, Any]:
         "mode_names": tuple(mode.name for mode in model.modes),
         "mode_poles": np.array([mode.pole for mode in model.modes]),
         "mode_participation": np.array([mode.participation for mode in model.modes]),
+        "growing_rotor_modes": tuple(mode.name for mode in model.growing_rotor_modes),
     }
 
 

@@ -111,6 +111,11 @@ class LinearModel(ByContent):
         """Modes by name, slowest first."""
         return modes(self.a, self.state_names)
 
+    @property
+    def growing_rotor_modes(self) -> tuple[Mode, ...]:
+        """Modes of flap, lag and inflow that grow, slowest first: what no pilot can hold."""
+        return tuple(mode for mode in self.modes if mode.family != "body" and mode.is_growing)
+
     @cached_property
     def poles(self) -> NDArray[np.complex128]:
         """All eigenvalues of A [rad/s], shape (n,), both of each pair, slowest first."""
@@ -287,6 +292,16 @@ def linearize(
 
     built = blocks(aircraft, point, difference_steps(aircraft, step_scale))
     return replace(model, method="paper", a=built["A"], b=built["B"], blocks=built)
+
+
+def growing_rotor_modes_text(model: LinearModel, aircraft: Aircraft) -> str:
+    """Rotor modes of a linear model that grow, with their poles and the names of the rotors; "none" without any."""
+    said = []
+    for mode in model.growing_rotor_modes:
+        imaginary = f" ± {mode.pole.imag:.5g}i" if mode.is_oscillatory else ""
+        names = ", ".join(aircraft.rotors[number - 1].name for number in mode.rotors)
+        said.append(f"{mode.name} at {mode.pole.real:.3g}{imaginary} rad/s ({names})")
+    return "; ".join(said) or "none"
 
 
 def settle(a: Array, b: Array, slow: Sequence[int]) -> tuple[Array, Array, Array, Array]:

@@ -7,9 +7,11 @@ IEEE Trans. PAS 101, 1982).
 """
 
 import math
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +21,20 @@ from sbs_sim.model.state import Part, part_of
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+Indices = NDArray[np.int64]
 
 LONGITUDINAL, LATERAL = ("u", "w", "q", "theta"), ("v", "p", "phi", "r")
 ALIKE = 1e-9  # poles that differ by less of the largest one are one multiple pole
 OWNED = 0.7  # share of one rotor in a mode of several beyond which it is that rotor's
-ROLLING = 0.15  # least share of p in a roll mode
+LEVEL = 0.9  # of the largest share: a family or rotor that comes as near to it has the mode as well
+NEXT = 0.8  # of the leading state's share: with as much the other half of the body has the mode as well
+NOTABLE = 0.5  # of the largest share: from here on a state has a say in the name
+PITCHING = 0.05  # share of q and theta over that of w from which what diverges is pitch
+STANDING = 1e-6  # of a revolution: slower than this a wave stands still as seen by the rotor
+SAME_SPEED = 0.01  # relative difference up to which rotors of one number of blades are alike
 COUPLED = 0.2  # share of flap, and of lag, from which a mode of the first matrix of eq. [32] is a coupled one
+
+Key = TypeVar("Key")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +50,18 @@ class Mode(ByContent):
         Right eigenvector, its largest component 1.
     participation : ndarray, shape (n,)
         Share of each state; the sum is 1.
+    family : str
+        What the mode is of, and named after: "body", "flap", "lag" or "inflow".
+    rotors : tuple of int
+        Numbers of the rotors that have it, from 1 as in the names of the states; empty for the body's.
     """
 
     name: str
     pole: complex
     vector: ComplexArray
     participation: Array
+    family: str = ""
+    rotors: tuple[int, ...] = ()
 
     @property
     def frequency(self) -> float:
@@ -61,6 +77,11 @@ class Mode(ByContent):
     def is_oscillatory(self) -> bool:
         """True for a pair."""
         return self.pole.imag > 0.0
+
+    @property
+    def is_growing(self) -> bool:
+        """True if the amplitude grows, by more than rounding gives."""
+        return self.pole.real > ALIKE * abs(self.pole)
 
     @property
     def time_to_half(self) -> float:
@@ -96,20 +117,10 @@ def modes(a: Array, state_names: Sequence[str]) -> tuple[Mode, ...]:
     ValueError
         A name that no linear state has, or not one name for each state.
     """
-    parts = _parts(a, state_names)
-    found = _unnamed(a, state_names)
-    groups = _groups(parts, state_names)
-    members: dict[str, list[Mode]] = defaultdict(list)
-    for mode, group in zip(found, _assign(found, groups), strict=True):
-        members[group].append(mode)
-    named: list[Mode] = []
-    for group, inside in members.items():
-        if group == "longitudinal":
-            named += _name_longitudinal(inside, state_names)
-        elif group == "lateral":
-            named += _name_lateral(inside, state_names)
-        else:
-            named += _name_rotor(inside, parts, state_names, groups[group])
+    _parts(a, state_names)
+    states = _states(tuple(state_names))
+    speeds = {rotor: _speed(a, states, rotor) for rotor in states.sizes}
+    named = _named(_unnamed(a, state_names), speeds, states)
     return tuple(sorted(_unique(named), key=lambda mode: (mode.frequency, mode.name)))
 
 
@@ -140,7 +151,9 @@ def first_matrix_modes(a: Array, state_names: Sequence[str]) -> tuple[Mode, ...]
         found = _rank(found, "coupled cyclic", ("coupled regressing", "coupled advancing"))
         for mode in found:
             suffix = f", rotor {rotor + 1}" if len(rotors) > 1 else ""
-            named.append(replace(_spread(mode, inside, len(parts)), name=f"{mode.name}{suffix}"))
+            own = replace(_spread(mode, inside, len(parts)), name=f"{mode.name}{suffix}", rotors=(rotor + 1,))
+            flap = sum(share for share, part in zip(own.participation, parts, strict=True) if part.family == "flap")
+            named.append(replace(own, family="flap" if flap >= 0.5 else "lag"))
     return tuple(sorted(_unique(named), key=lambda mode: (mode.frequency, mode.name)))
 
 
@@ -198,95 +211,298 @@ def _separate(
     return right, left
 
 
-def _groups(parts: Sequence[Part], state_names: Sequence[str]) -> dict[str, list[int]]:
-    """Indices of the states by what they describe."""
-    groups: dict[str, list[int]] = defaultdict(list)
-    for i, (part, name) in enumerate(zip(parts, state_names, strict=True)):
-        if part.family == "body":
-            groups["longitudinal" if name in LONGITUDINAL else "lateral"].append(i)
+# --- what a mode is of ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _States:
+    """States of a matrix, and where those are that belong together."""
+
+    names: tuple[str, ...]
+    parts: tuple[Part, ...]
+
+    @cached_property
+    def halves(self) -> list["_Group"]:
+        """Groups of the body."""
+        body = self.where(family="body")
+        halves = [np.array([i for i in body if (self.names[i] in LATERAL) == half]) for half in (False, True)]
+        return [_Group("body", bool(i), (), half, {}, {}, {}) for i, half in enumerate(halves) if len(half)]
+
+    @cached_property
+    def places(self) -> dict[str, int]:
+        """Of the states by name."""
+        return {name: i for i, name in enumerate(self.names)}
+
+    @cached_property
+    def families(self) -> dict[str, Indices]:
+        """Places of the states of each family."""
+        return {family: self.where(family=family) for family in dict.fromkeys(part.family for part in self.parts)}
+
+    @cached_property
+    def sizes(self) -> dict[int, int]:
+        """Number of states of each rotor."""
+        return {rotor: len(self.where(rotor=rotor)) for rotor in sorted({part.rotor for part in self.parts} - {-1})}
+
+    @cached_property
+    def turning(self) -> dict[int, list[Indices]]:
+        """Places of the rates of the first harmonic of flap and of lag of each rotor."""
+        pairs = {
+            rotor: [self.where(family=family, harmonic=1, rotor=rotor, is_rate=True) for family in ("flap", "lag")]
+            for rotor in self.sizes
+        }
+        return {rotor: [pair for pair in found if len(pair) == 2] for rotor, found in pairs.items()}
+
+    def where(self, **wanted: object) -> Indices:
+        """Places of the states whose parts have these attributes, in the order of their names."""
+        items = wanted.items()
+        found = [i for i, part in enumerate(self.parts) if all(getattr(part, key) == value for key, value in items)]
+        return np.array(sorted(found, key=lambda i: self.names[i]), dtype=np.int64)
+
+
+@cache
+def _states(names: tuple[str, ...]) -> _States:
+    return _States(names, tuple(part_of(name) for name in names))
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """States that have modes together: the longitudinal ones, the lateral ones, a family of rotors that are alike.
+
+    Attributes
+    ----------
+    family : str
+    is_lateral : bool
+    rotors : tuple of int
+        Their indices.
+    states : ndarray of int
+        Places of the states.
+    by_harmonic, by_rotor, by_both : dict of ndarray of int
+        Places of those of a harmonic, of a rotor, and of a rotor and a harmonic without rates; of rotors only.
+    """
+
+    family: str
+    is_lateral: bool
+    rotors: tuple[int, ...]
+    states: Indices
+    by_harmonic: dict[int, Indices]
+    by_rotor: dict[int, Indices]
+    by_both: dict[tuple[int, int], Indices]
+
+
+@cache
+def _rotor_groups(states: _States, rotors: tuple[int, ...]) -> list[_Group]:
+    """Groups of some rotors, which are alike."""
+    families = dict.fromkeys(part.family for part in states.parts if part.rotor == rotors[0])
+    return [_rotor_group(states, family, rotors) for family in families]
+
+
+def _rotor_group(states: _States, family: str, rotors: tuple[int, ...]) -> _Group:
+    by_rotor = {rotor: states.where(family=family, rotor=rotor) for rotor in rotors}
+    together = np.concatenate(list(by_rotor.values()))
+    harmonics = np.array([states.parts[i].harmonic for i in together])
+    by_harmonic = {int(harmonic): together[harmonics == harmonic] for harmonic in dict.fromkeys(harmonics)}
+    by_both = {
+        (rotor, harmonic): states.where(family=family, rotor=rotor, harmonic=harmonic, is_rate=False)
+        for rotor in rotors
+        for harmonic in by_harmonic
+    }
+    return _Group(family, False, rotors, together, by_harmonic, by_rotor, by_both)
+
+
+def _alike_rotors(speeds: Mapping[int, float], states: _States) -> list[tuple[int, ...]]:
+    """Rotors of one number of states and one speed, which may share modes."""
+    found: list[list[int]] = []
+    for rotor, speed in speeds.items():
+        for members in found:
+            other = speeds[members[0]]
+            # a speed that is not known is no difference
+            if states.sizes[rotor] == states.sizes[members[0]] and not abs(speed - other) > SAME_SPEED * other:
+                members.append(rotor)
+                break
         else:
-            groups[f"{part.family} {part.harmonic}"].append(i)
-    return dict(groups)
+            found.append([rotor])
+    return [tuple(members) for members in found]
 
 
-def _assign(found: Sequence[Mode], groups: dict[str, list[int]]) -> list[str]:
-    """Group of each mode: as many poles to a group as it has states, with the largest total participation."""
-    slots = [(name, 1.0) for name, states in groups.items() for _ in states]
-    participation = np.array([mode.participation for mode in found])
-    shares = {name: participation[:, states].sum(axis=1).tolist() for name, states in groups.items()}
-    return [names[0] for names in _match(found, [name for name, _ in slots], shares)]
+def _speed(a: Array, states: _States, rotor: int) -> float:
+    """Speed of a rotor [rad/s], not a number where the states do not tell.
+
+    The turning of the multiblade coordinates couples the rates of the two of the nth harmonic by -2 n Omega and
+    2 n Omega (theory.md eq. 1.8). The product of both elements does not depend on units. Flap tells it to 1e-5, lag,
+    whose inertia the hub adds to, to some per cent.
+    """
+    for cosine, sine in states.turning[rotor]:
+        if (product := a[cosine, sine] * a[sine, cosine]) < 0.0:
+            return math.sqrt(-product) / 2.0
+    return math.nan
 
 
-def _match(found: Sequence[Mode], slots: Sequence[str], shares: dict[str, list[float]]) -> list[list[str]]:
-    """Slots of each mode, two of a pair, that maximise the sum of the shares; the larger share first."""
-    from scipy.optimize import linear_sum_assignment  # here: it takes a quarter of a second, and few need it
+def _leading(shares: Mapping[Key, float], first: Key) -> list[Key]:
+    """Those with the largest share or next to it, largest first; `first` before all if it is one of them."""
+    limit = LEVEL * max(shares.values())
+    return sorted((key for key in shares if shares[key] >= limit), key=lambda key: (key != first, -shares[key]))
 
-    owners = [i for i, mode in enumerate(found) for _ in range(1 + mode.is_oscillatory)]
-    gain = np.array([shares[slot] for slot in slots]).T[owners].reshape(len(owners), len(slots))
-    result: list[list[str]] = [[] for _ in found]
-    for row, column in zip(*linear_sum_assignment(gain, maximize=True), strict=True):
-        result[owners[row]].append(slots[column])
-    return [sorted(taken, key=lambda slot: -shares[slot][i]) for i, taken in enumerate(result)]
+
+def _choices(mode: Mode, groups: Sequence[_Group], states: _States) -> list[tuple[_Group, float]]:
+    """Groups that a mode may be of, the best one first, with what it has of them relative to that.
+
+    The family with the largest share, and in it the half of the body with the leading state, or the rotors with the
+    largest share. Others that come near remain choices.
+    """
+    lead = states.parts[int(mode.participation.argmax())]
+    shares = {family: float(mode.participation[places].sum()) for family, places in states.families.items()}
+    found: list[tuple[_Group, float]] = []
+    for family in _leading(shares, lead.family):
+        measure, least = (np.max, NEXT) if family == "body" else (np.sum, LEVEL)
+        own = [(group, float(measure(mode.participation[group.states]))) for group in groups if group.family == family]
+        largest = max(share for _, share in own)
+        near = [(group, share / largest) for group, share in own if share >= least * largest]
+        found += sorted(near, key=lambda choice: -choice[1])
+    return found
+
+
+def _named(found: Sequence[Mode], speeds: Mapping[int, float], states: _States) -> list[Mode]:
+    """Every mode with the name that its group gives; of two with one name one takes its next choice if that is free."""
+    groups = [*states.halves]
+    for rotors in _alike_rotors(speeds, states):
+        groups += _rotor_groups(states, rotors)
+    choices = [_choices(mode, groups, states) for mode in found]
+    chosen = [own[0][0] for own in choices]
+    named = _with_names(found, chosen, speeds, states)
+    others = [(share, i, group) for i, own in enumerate(choices) for group, share in own[1:]]
+    for _, i, group in sorted(others, key=lambda other: -other[0]):
+        if len({mode.name for mode in named}) == len(named):
+            break
+        trial = [*chosen[:i], group, *chosen[i + 1 :]]
+        again = _with_names(found, trial, speeds, states)
+        if len({mode.name for mode in again}) > len({mode.name for mode in named}):
+            chosen, named = trial, again
+    return named
+
+
+def _with_names(
+    found: Sequence[Mode], chosen: Sequence[_Group], speeds: Mapping[int, float], states: _States
+) -> list[Mode]:
+    """Modes with the names that their groups give."""
+    named: list[Mode] = []
+    for group in dict.fromkeys(chosen):
+        inside = [mode for mode, own in zip(found, chosen, strict=True) if own is group]
+        if group.family != "body":
+            named += _name_rotors(inside, group, speeds, states)
+            continue
+        names = _lateral_names(inside, states) if group.is_lateral else _longitudinal_names(inside, states)
+        named += [
+            replace(mode, name="heave-yaw" if _is_heave_yaw(mode, states) else name, family="body")
+            for mode, name in zip(inside, names, strict=True)
+        ]
+    return named
 
 
 # --- names of the body's modes ----------------------------------------------------------------------------------
 
 
-def _share(mode: Mode, state_names: Sequence[str], wanted: Iterable[str]) -> float:
-    return float(sum(mode.participation[state_names.index(name)] for name in wanted if name in state_names))
+def _shares(mode: Mode, states: _States, wanted: Iterable[str]) -> dict[str, float]:
+    """Shares of states, 0 of those that there are not."""
+    places = states.places
+    return {name: float(mode.participation[places[name]]) if name in places else 0.0 for name in wanted}
 
 
-def _name_longitudinal(inside: list[Mode], state_names: Sequence[str]) -> list[Mode]:
-    """Heave subsidence (or divergence) where w has a pole of its own, short period with q, phugoid with u, theta."""
-    owners = {"heave subsidence": ("w",), "short period": ("q",), "phugoid": ("u", "theta")}
-    slots = [name for name, states in owners.items() for state in states if state in state_names]
-    shares = {name: [_share(mode, state_names, states) for mode in inside] for name, states in owners.items()}
-    named = []
-    for mode, taken in zip(inside, _match(inside, slots, shares), strict=True):
-        name = taken[0] if taken else "longitudinal"
-        if len(set(taken)) > 1:  # a pair of w and q is the short period of forward flight
-            name = "short period" if "short period" in taken else "phugoid"
-        growing = name == "heave subsidence" and mode.pole.real > 0.0
-        named.append(replace(mode, name="heave divergence" if growing else name))
-    return named
+def _is_heave_yaw(mode: Mode, states: _States) -> bool:
+    """True for an oscillation of w and r against each other, which has none of the classical names."""
+    shares = _shares(mode, states, (*LONGITUDINAL, *LATERAL))
+    first, second = sorted(shares, key=lambda name: -shares[name])[:2]
+    return mode.is_oscillatory and {first, second} == {"w", "r"} and shares[second] >= NOTABLE * shares[first]
 
 
-def _name_lateral(inside: list[Mode], state_names: Sequence[str]) -> list[Mode]:
-    """Roll with p; of the others the pair is the Dutch roll, and the spiral is what takes least of v."""
-    roll = [_share(mode, state_names, ("p",)) for mode in inside]
-    side = [_share(mode, state_names, ("v",)) for mode in inside]
-    pairs = sorted((i for i, mode in enumerate(inside) if mode.is_oscillatory), key=lambda i: -side[i])
-    real = [i for i in range(len(inside)) if i not in pairs]
-    names = dict.fromkeys(range(len(inside)), "Dutch roll")
-    names.update(dict.fromkeys(pairs[1:], "roll-spiral"))
-    rolling = max(real, key=lambda i: roll[i], default=None)
-    if rolling is not None and roll[rolling] >= ROLLING:
-        names[rolling] = "roll"
-        real.remove(rolling)
-    if real:
-        spiral = min(real, key=lambda i: side[i])
-        names[spiral] = "spiral"
-    return [replace(mode, name=names[i]) for i, mode in enumerate(inside)]
+def _longitudinal_names(inside: Sequence[Mode], states: _States) -> list[str]:
+    """Phugoid of u and theta, short period of q, or of w and q if they oscillate, heave of w; or what diverges."""
+    return [_longitudinal_name(mode, _shares(mode, states, LONGITUDINAL)) for mode in inside]
+
+
+def _longitudinal_name(mode: Mode, share: Mapping[str, float]) -> str:
+    if mode.is_oscillatory:
+        return "short period" if share["w"] + share["q"] > share["u"] + share["theta"] else "phugoid"
+    lead = max(share, key=lambda name: share[name])
+    if lead in ("u", "theta"):
+        return "phugoid"
+    if mode.is_growing:
+        return "pitch divergence" if share["q"] + share["theta"] >= PITCHING * share["w"] else "heave divergence"
+    return "short period" if lead == "q" else "heave subsidence"
+
+
+def _lateral_names(inside: Sequence[Mode], states: _States) -> list[str]:
+    """Dutch roll of v with phi or r, roll of p, spiral of r or phi; roll-spiral for a pair with little of v.
+
+    Without a pair for the Dutch roll real poles with much of v are it, and what diverges of v and r is yaw; but of
+    several real poles the one with least of v is the spiral.
+    """
+    shares = [_shares(mode, states, LATERAL) for mode in inside]
+    names = [
+        _lateral_pair(share) if mode.is_oscillatory else "roll" if share["p"] == max(share.values()) else ""
+        for mode, share in zip(inside, shares, strict=True)
+    ]
+    left = sorted((i for i, name in enumerate(names) if not name), key=lambda i: shares[i]["v"])
+    slipping = [i for i in left if "Dutch roll" not in names and shares[i]["v"] >= NOTABLE * max(shares[i].values())]
+    for i in left:
+        is_yaw = inside[i].is_growing and shares[i]["r"] > shares[i]["phi"]
+        names[i] = ("yaw divergence" if is_yaw else "Dutch roll") if i in slipping else "spiral"
+    if len(left) == len(slipping) > 1:
+        names[left[0]] = "spiral"
+    return names
+
+
+def _lateral_pair(share: Mapping[str, float]) -> str:
+    lead = max(share.values())
+    if share["v"] >= NOTABLE * lead:
+        return "Dutch roll"
+    return "roll" if max(share["phi"], share["r"]) < NOTABLE * lead else "roll-spiral"
 
 
 # --- names of the rotors' modes ---------------------------------------------------------------------------------
 
 
-def _name_rotor(inside: list[Mode], parts: Sequence[Part], state_names: Sequence[str], states: list[int]) -> list[Mode]:
-    """Names of the modes of one family and harmonic, with what several rotors do together."""
-    family, harmonic = parts[states[0]].family, parts[states[0]].harmonic
-    rotors = sorted({parts[i].rotor for i in states})
-    states = sorted(states, key=lambda i: state_names[i])  # so that the rotors' coordinates stand in one order
-    name = _family_name(family, harmonic)
-    base = [replace(mode, name=name) for mode in inside]
-    if family != "inflow" and harmonic > 0:  # all rotors together: half of all poles are slow, whoever has them
-        base = _rank(base, name, (f"regressing {name}", f"advancing {name}"))
-    named = []
-    for mode in base:
-        owner = _owner(mode, parts, states, rotors)
-        suffix = owner if owner != "together" else _symmetry(mode, parts, states, rotors)
-        named.append(replace(mode, name=f"{mode.name}{suffix}"))
-    return named
+def _name_rotors(inside: Sequence[Mode], group: _Group, speeds: Mapping[int, float], states: _States) -> list[Mode]:
+    """Names of the modes of a family: as many poles to a harmonic as it has states, with the largest participation.
+
+    One for one, because some are close together: with nu near 1/2 collective and regressing lag are.
+    """
+    slots = [harmonic for harmonic, places in group.by_harmonic.items() for _ in places]
+    shares = {
+        harmonic: [float(mode.participation[places].sum()) for mode in inside]
+        for harmonic, places in group.by_harmonic.items()
+    }
+    largest = [max(shares, key=lambda harmonic: shares[harmonic][i]) for i in range(len(inside))]
+    return [
+        _name_rotor(mode, group, taken[0] if taken else alone, speeds, states)
+        for mode, taken, alone in zip(inside, _match(inside, slots, shares), largest, strict=True)
+    ]
+
+
+def _match(found: Sequence[Mode], slots: Sequence[int], shares: Mapping[int, list[float]]) -> list[list[int]]:
+    """Slots of each mode, two of a pair, that maximise the sum of the shares; the larger share first."""
+    from scipy.optimize import linear_sum_assignment  # here: it takes a quarter of a second, and few need it
+
+    owners = [i for i, mode in enumerate(found) for _ in range(1 + mode.is_oscillatory)]
+    gain = np.array([shares[slot] for slot in slots]).T[owners].reshape(len(owners), len(slots))
+    result: list[list[int]] = [[] for _ in found]
+    for row, column in zip(*linear_sum_assignment(gain, maximize=True), strict=True):
+        result[owners[row]].append(slots[column])
+    return [sorted(taken, key=lambda slot: -shares[slot][i]) for i, taken in enumerate(result)]
+
+
+def _name_rotor(mode: Mode, group: _Group, harmonic: int, speeds: Mapping[int, float], states: _States) -> Mode:
+    """Name of a mode of a harmonic, with the rotor that has it, or what several do together."""
+    name = _family_name(group.family, harmonic)
+    shares = {rotor: float(mode.participation[places].sum()) for rotor, places in group.by_rotor.items()}
+    owner = max(shares, key=lambda rotor: shares[rotor])
+    if group.family != "inflow" and harmonic > 0:
+        name = f"{_way(mode, harmonic * speeds[owner], group.by_both[owner, harmonic])} {name}".strip()
+    having = (owner,) if shares[owner] > OWNED * sum(shares.values()) else group.rotors
+    name += _rotors_suffix(having, len(states.sizes))
+    if len(having) == 2:
+        first, second = (mode.vector[group.by_both[rotor, harmonic]] for rotor in having)
+        name += ", symmetric" if np.vdot(first, second).real > 0.0 else ", antisymmetric"
+    return replace(mode, name=name, family=group.family, rotors=tuple(rotor + 1 for rotor in having))
 
 
 def _family_name(family: str, harmonic: int) -> str:
@@ -299,34 +515,31 @@ def _family_name(family: str, harmonic: int) -> str:
     return family if harmonic == 1 else f"{family} {harmonic}"
 
 
-def _owner(mode: Mode, parts: Sequence[Part], states: list[int], rotors: list[int]) -> str:
-    """Suffix of the rotor that has the mode alone, empty for an only rotor, "together" else."""
-    if len(rotors) == 1:
+def _rotors_suffix(having: Sequence[int], everybody: int) -> str:
+    """Which rotors have a mode, where not all of them do."""
+    if len(having) == everybody:
         return ""
-    total = mode.participation[states].sum()
-    for rotor in rotors:
-        own = mode.participation[[i for i in states if parts[i].rotor == rotor]].sum()
-        if own > OWNED * total:
-            return f", rotor {rotor + 1}"
-    return "together"
+    numbers = [str(rotor + 1) for rotor in having]
+    return f", rotor {numbers[0]}" if len(numbers) == 1 else f", rotors {', '.join(numbers[:-1])} and {numbers[-1]}"
 
 
-def _symmetry(mode: Mode, parts: Sequence[Part], states: list[int], rotors: list[int]) -> str:
-    """Suffix for two rotors: their coordinates move alike or against each other."""
-    if len(rotors) != 2:
+def _way(mode: Mode, turning: float, coordinates: Indices) -> str:
+    """Regressing or advancing, as the rotor sees the wave of a cyclic coordinate; empty where it does neither.
+
+    With the rotating frequency nu the modes of the nth harmonic are at |nu - n| and nu + n per revolution. Slower than
+    n revolutions (`turning`) is regressing. A faster one turns against the rotor if it regresses (nu above 2 n), the
+    sine coordinate before the cosine one, and with the rotor if it advances.
+    """
+    if not mode.is_oscillatory or mode.pole.imag < turning * (1.0 - STANDING):
+        return "regressing"
+    if not mode.pole.imag > turning * (1.0 + STANDING) or len(coordinates) != 2:
         return ""
-    first, second = (mode.vector[[i for i in states if parts[i].rotor == rotor]] for rotor in rotors)
-    if len(first) != len(second):
-        return ""
-    return ", symmetric" if np.vdot(first, second).real > 0.0 else ", antisymmetric"
+    cosine, sine = mode.vector[coordinates]  # a1 and b1, xic and xis: in the order of their names
+    return "regressing" if (cosine.conjugate() * sine).imag > 0.0 else "advancing"
 
 
 def _rank(found: list[Mode], name: str, ways: tuple[str, str]) -> list[Mode]:
-    """Rename modes called `name`: the slower half of their poles regress, the faster half advance.
-
-    The modes of a cyclic coordinate with the rotating frequency nu are at |nu - n| and nu + n per revolution. A real
-    pole does not oscillate at all and so belongs to the slower ones.
-    """
+    """Rename modes of one rotor that are called `name`: the slower half of their poles regress, the faster advance."""
     poles = sorted(
         (i for i, mode in enumerate(found) if mode.name == name for _ in range(1 + mode.is_oscillatory)),
         key=lambda i: (found[i].pole.imag, found[i].frequency),

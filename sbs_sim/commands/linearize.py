@@ -72,7 +72,7 @@ def make_parser() -> Parser:
 
 def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.analysis.export import ENCODERS, check_target, to_json, write
-    from sbs_sim.analysis.linearize import linearize
+    from sbs_sim.analysis.linearize import growing_rotor_modes_text, linearize
 
     check_target(arguments.out, ENCODERS)
     check_target(arguments.json)
@@ -80,6 +80,7 @@ def _work(arguments: argparse.Namespace) -> None:
     full = linearize(craft, **flight(arguments), method=arguments.method)
     model = full.quasi_static() if arguments.quasi_static else full
     _print_model(craft, model)
+    print(f"growing rotor modes: {growing_rotor_modes_text(full, craft)}")
     if arguments.out:
         model.save(arguments.out)
     if arguments.json:

@@ -181,4 +181,4 @@ def _growing(point: "SweepPoint") -> str:
     """Modes that grow."""
     if point.model is None:
         return ""
-    return "; ".join(mode.name for mode in point.model.modes if mode.pole.real > 0.0)
+    return "; ".join(mode.name for mode in point.model.modes if mode.is_growing)

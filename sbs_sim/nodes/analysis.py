@@ -18,7 +18,7 @@ from sbs_msgs.action import Sweep
 from sbs_msgs.msg import LinearModel, TrimPoint
 from sbs_msgs.srv import Linearize, Trim
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.linearize import linearize
+from sbs_sim.analysis.linearize import growing_rotor_modes_text, linearize
 from sbs_sim.analysis.sweep import SweepPoint, sweep
 from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError
@@ -87,8 +87,14 @@ class Analysis(Component):
             model = linearize(self._aircraft, **_condition(request), method=request.method)
             response.model, response.warnings = model_message(self._aircraft, model), model.warnings
             self._linear_model.publish(response.model, self._now())
+            if model.growing_rotor_modes:
+                done.append(f"growing rotor modes: {growing_rotor_modes_text(model, self._aircraft)}")
 
-        return self.answer(response, act, "linearized")
+        done = ["linearized"]
+        response = self.answer(response, act, done[0])
+        if response.success:
+            response.message = "; ".join(done)
+        return response
 
     def _sweep(self, goal: ServerGoalHandle) -> Sweep.Result:
         """Sweep as a goal asks for; in a thread of its own."""

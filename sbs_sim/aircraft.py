@@ -171,7 +171,8 @@ class Aircraft(ByContent):
     control_ranges : dict of str to (float, float)
         Range of each pilot control [rad].
     rotors : tuple of Rotor
-    airfoils : dict of str to AirfoilTable
+    tables : tuple of AirfoilTable
+        Section data of each rotor's blades; one object for rotors that have the same.
     data : dict
         The mapping that this is made of, with the keys of the file; not to be changed.
     folder : Path
@@ -185,7 +186,7 @@ class Aircraft(ByContent):
     options: Options
     control_ranges: dict[str, Range]
     rotors: tuple[Rotor, ...]
-    airfoils: dict[str, AirfoilTable] = field(repr=False)
+    tables: tuple[AirfoilTable, ...] = field(repr=False)
     data: dict[str, Any] = field(repr=False, compare=False)
     folder: Path = field(repr=False, compare=False)
 
@@ -243,7 +244,7 @@ class Aircraft(ByContent):
             options=Options(**{**data["options"], "elements": int(data["options"]["elements"])}),
             control_ranges={name: _radians(data["controls"][name]["range_deg"]) for name in CONTROL_NAMES},
             rotors=rotors,
-            airfoils=_load_airfoils(rotors, folder, similar),
+            tables=_load_tables(rotors, folder, similar),
             data=data,
             folder=folder.absolute(),
         )
@@ -314,6 +315,12 @@ class Aircraft(ByContent):
     def __hash__(self) -> int:
         return hash((self.name, self.parameter_hash))
 
+    @property
+    def airfoils(self) -> dict[str, AirfoilTable]:
+        """Section data by the names in the file; of an airfoil that was extended those for the first of its rotors."""
+        pairs = zip(self.rotors, self.tables, strict=True)
+        return {rotor.airfoil: table for rotor, table in reversed(list(pairs))}
+
     @cached_property
     def layout(self) -> StateLayout:
         """Places and names of the states of this aircraft."""
@@ -331,8 +338,7 @@ class Aircraft(ByContent):
             for name, value in vars(part).items():
                 if name not in NOT_PHYSICS:
                     _digest(digest, name, value)
-        for rotor in self.rotors:
-            table = self.airfoils[rotor.airfoil]
+        for table in self.tables:
             for name in ("reynolds", "alpha", "cl", "cd"):
                 _digest(digest, name, getattr(table, name))
         return digest.hexdigest()
@@ -400,12 +406,11 @@ class Aircraft(ByContent):
     @cached_property
     def stall_table(self) -> Array:
         """Reynolds numbers and stall angles of every rotor as `working_state` takes them, shape (n_rotors, 3, n)."""
-        tables = [self.airfoils[rotor.airfoil] for rotor in self.rotors]
-        size = max(len(table.reynolds) for table in tables)
+        size = max(len(table.reynolds) for table in self.tables)
         return np.array(
             [
                 np.pad((table.reynolds, *stall_angles(table)), ((0, 0), (0, size - len(table.reynolds))), "edge")
-                for table in tables
+                for table in self.tables
             ]
         )
 
@@ -414,10 +419,10 @@ class Aircraft(ByContent):
         """Arrays but for the switches; nobody writes to them."""
         complete = self.options.coupling == "complete"
         mass, first, inertia = self.fuselage() if complete else (self.body.mass, np.zeros(3), self.body.inertia)
-        names = sorted(self.airfoils)
-        tables = [cells(self.airfoils[name]) for name in names]
+        different = list(dict.fromkeys(self.tables))
+        tables = [cells(table) for table in different]
         first_rows = np.concatenate([[0], np.cumsum([len(table) for table in tables])])
-        index, grid = _airfoil_grids(self, dict(zip(names, first_rows, strict=False)))
+        index, grid = _airfoil_grids(self, dict(zip(different, first_rows, strict=False)))
         air = self.environment
         return P.Params(
             air=np.array([air.air_density, 1 / air.kinematic_viscosity, air.gravity, *self.body.flat_plate_areas]),
@@ -583,38 +588,40 @@ def _radians(degrees: list[float]) -> Range:
     return math.radians(degrees[0]), math.radians(degrees[1])
 
 
-def _load_airfoils(rotors: tuple[Rotor, ...], folder: Path, similar: Aircraft | None) -> dict[str, AirfoilTable]:
-    """Airfoil table of every name that a rotor uses; a partial table is extended for its blade's aspect ratio.
+def _load_tables(rotors: tuple[Rotor, ...], folder: Path, similar: Aircraft | None) -> tuple[AirfoilTable, ...]:
+    """Airfoil table of every rotor; a partial table is extended for the aspect ratio of its blades.
 
     What a similar aircraft from the same folder has read already is not read again.
     """
-    read = _aspect_ratios(similar.rotors) if similar else {}
-    tables: dict[str, AirfoilTable] = {}
-    for name, aspect_ratio in _aspect_ratios(rotors).items():
-        i = [rotor.airfoil for rotor in rotors].index(name)
-        if similar and read.get(name) == aspect_ratio:
-            tables[name] = similar.airfoils[name]
-            continue
-        try:
-            path = _find(name, "airfoils", ".csv", folder)
-        except AircraftError as error:
-            raise AircraftError(f"rotors[{i}].{error}") from None
-        if similar and name in read and _covers_circle(path):
-            tables[name] = similar.airfoils[name]
-            continue
-        try:
-            tables[name] = read_table(path, aspect_ratio)
-        except AirfoilError as error:
-            raise AirfoilError(f"rotors[{i}].airfoil = {name!r}: {error}") from None
-    return tables
+    known: dict[tuple[str, float], AirfoilTable] = {}
+    if similar:
+        known = {_section(rotor): table for rotor, table in zip(similar.rotors, similar.tables, strict=True)}
+    tables = []
+    for i, rotor in enumerate(rotors):
+        section = _section(rotor)
+        if section not in known:
+            known[section] = _read_table(i, rotor, folder, {name: table for (name, _), table in known.items()})
+        tables.append(known[section])
+    return tuple(tables)
 
 
-def _aspect_ratios(rotors: tuple[Rotor, ...]) -> dict[str, float]:
-    """Aspect ratio of the first blade that has each airfoil."""
-    ratios: dict[str, float] = {}
-    for rotor in rotors:
-        ratios.setdefault(rotor.airfoil, 2 * rotor.radius / (rotor.chord_root + rotor.chord_tip))
-    return ratios
+def _section(rotor: Rotor) -> tuple[str, float]:
+    """Airfoil and aspect ratio of a rotor's blades."""
+    return rotor.airfoil, 2 * rotor.radius / (rotor.chord_root + rotor.chord_tip)
+
+
+def _read_table(i: int, rotor: Rotor, folder: Path, known: dict[str, AirfoilTable]) -> AirfoilTable:
+    """Table of a rotor: the known one of its airfoil, if that is the same for every blade, else from the file."""
+    try:
+        path = _find(rotor.airfoil, "airfoils", ".csv", folder)
+    except AircraftError as error:
+        raise AircraftError(f"rotors[{i}].{error}") from None
+    if rotor.airfoil in known and _covers_circle(path):
+        return known[rotor.airfoil]
+    try:
+        return read_table(path, _section(rotor)[1])
+    except AirfoilError as error:
+        raise AirfoilError(f"rotors[{i}].airfoil = {rotor.airfoil!r}: {error}") from None
 
 
 def _covers_circle(path: Path) -> bool:
@@ -636,18 +643,17 @@ def _digest(digest: Any, name: str, value: Any) -> None:
     digest.update(f"{name}{values.shape}".encode() + values.tobytes())
 
 
-def _airfoil_grids(aircraft: Aircraft, first_rows: dict[str, int]) -> tuple[P.IntArray, Array]:
-    """`grid_index` and `grid` of Params, with the first row of each airfoil in `cells`."""
-    most = max(len(table.reynolds) - 1 for table in aircraft.airfoils.values())
+def _airfoil_grids(aircraft: Aircraft, first_rows: dict[AirfoilTable, int]) -> tuple[P.IntArray, Array]:
+    """`grid_index` and `grid` of Params, with the first row of each table in `cells`."""
+    most = max(len(table.reynolds) - 1 for table in aircraft.tables)
     most += -most % P.KNOT_GROUP
     elements = aircraft.options.elements + -aircraft.options.elements % P.REGISTER
     index = np.zeros((len(aircraft.rotors), 4), dtype=np.int64)
     grid = np.zeros((len(aircraft.rotors), 2 + 2 * most))
-    for j, rotor in enumerate(aircraft.rotors):
-        table = aircraft.airfoils[rotor.airfoil]
+    for j, table in enumerate(aircraft.tables):
         count = len(table.reynolds) - 1
         n_alpha, alpha0, inverse_step = cell_grid(table)
-        index[j] = first_rows[rotor.airfoil], n_alpha, count, elements
+        index[j] = first_rows[table], n_alpha, count, elements
         grid[j, :2] = alpha0, inverse_step
         widths = np.diff(table.reynolds)
         grid[j, 2 : 2 + count] = 1 / widths

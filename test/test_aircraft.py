@@ -872,6 +872,29 @@ def test_a_partial_airfoil_is_extended_for_the_new_blade(tmp_path):
     assert slender.airfoils["wing"].cd.max() > aircraft.airfoils["wing"].cd.max()
 
 
+def test_a_partial_airfoil_is_extended_for_the_blades_of_each_rotor(tmp_path):
+    """At 90 deg its drag is 1.11 + 0.018 AR: of the one rotor's blades, of the other's, which are more slender."""
+    (tmp_path / "wing.csv").write_text(POLAR)
+    data = sbs_data()
+    for rotor in data["rotors"]:
+        rotor["airfoil"] = "wing"
+    same = Aircraft.from_dict(data, tmp_path)
+    assert same.tables[0] is same.tables[1]
+    data["rotors"][1]["radius"] = 1.0
+    for aircraft in (Aircraft.from_dict(data, tmp_path), same.with_value("rotors[1].radius", 1.0)):
+        broadside = [table.cd[0, 3 * (len(table.alpha) - 1) // 4] for table in aircraft.tables]
+        assert broadside == pytest.approx([1.11 + 0.018 * 0.505 / 0.051, 1.11 + 0.018 * 1.0 / 0.051])
+        assert aircraft.parameter_hash == Aircraft.from_dict(data, tmp_path).parameter_hash
+        assert list(aircraft.airfoils) == ["wing"]
+    # what flies has both: across the wind, with a blade of any pitch, the drag of each
+    params = aircraft.params()
+    first = params.grid_index[:, 0]
+    quarter = params.grid_index[0, 1] // 12 + params.grid_index[0, 1] // 2  # cell that begins at 90 deg, of three turns
+    assert [params.cells[row + quarter, 4] for row in first] == pytest.approx(broadside)
+    copied, files = aircraft.files()
+    assert [rotor["airfoil"] for rotor in copied["rotors"]] == list(files) * 2
+
+
 def test_another_airfoil_is_read(sbs):
     variant = sbs.with_value("rotors.airfoil", "linear_573")
     assert list(variant.airfoils) == ["linear_573"]

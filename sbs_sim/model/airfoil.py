@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 COLUMNS = ("reynolds", "alpha_deg", "cl", "cd")
 HEADER = ",".join(COLUMNS)
+PLATE_DRAG, PLATE_DRAG_SLOPE = 1.11, 0.018  # of a blade broadside on: at no aspect ratio, and by aspect ratio
+INFINITE_BLADE = 50.0  # aspect ratio from which it is that of an infinite plate, 2.01
 REFLECTED_LIFT = -0.7  # cl of the reversed airfoil over cl of the airfoil at the mirrored angle
 TURNS = 3  # turns of the angle that the cells cover: -540..540 deg
 MIN_STEP_DEG, MAX_STEP_DEG = 0.01, 10.0
@@ -89,7 +91,7 @@ def viterna(
     cl_stall, cd_stall : float
         Coefficients at the stall point.
     aspect_ratio : float
-        Blade length over chord, which sets the drag of the blade broadside on.
+        Blade length over chord, which sets the drag of the blade broadside on: 1.11 + 0.018 of it up to 50, 2.01 above.
 
     Returns
     -------
@@ -106,7 +108,7 @@ def viterna(
     stalled = np.maximum(folded, alpha_stall)
     sine, cosine = np.sin(stalled), np.cos(stalled)
     sine_s, cosine_s = math.sin(alpha_stall), math.cos(alpha_stall)
-    cd_max = 1.11 + 0.018 * aspect_ratio
+    cd_max = PLATE_DRAG + PLATE_DRAG_SLOPE * min(aspect_ratio, INFINITE_BLADE)
     a2 = (cl_stall - cd_max * sine_s * cosine_s) * sine_s / cosine_s**2
     b2 = (cd_stall - cd_max * sine_s**2) / cosine_s
     cl = cd_max * sine * cosine + a2 * cosine**2 / sine

@@ -1,6 +1,7 @@
 """The edges of the model: what it says of itself there, that it stays finite, and that it comes back; the ground."""
 
 import csv
+import dataclasses
 import math
 
 import numpy as np
@@ -12,7 +13,7 @@ from sbs_sim.analysis.export import sweep_to_csv
 from sbs_sim.errors import SimulationError
 from sbs_sim.model import state as S
 from sbs_sim.model import working_state as W
-from sbs_sim.model.airfoil import AirfoilTable, stall_angles
+from sbs_sim.model.airfoil import AirfoilTable, read_table, stall_angles
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.wind import Wind
 from sbs_sim.simulation import refly, trimmed_state
@@ -138,6 +139,32 @@ def test_reverse_flow_is_a_circle_beside_the_hub(sbs, hover, speed):
     assert np.mean(shares) == pytest.approx(expected, abs=0.01)
 
 
+HALF_DEGREES = np.radians(np.arange(-180.0, 180.5, 0.5))
+
+
+def table_of(*polars, alpha=HALF_DEGREES):
+    """Table with the lift of functions of the angle in degrees, one for each Reynolds number."""
+    cl = np.array([polar(np.degrees(alpha)) for polar in polars])
+    return AirfoilTable("x", 1e5 * np.arange(1.0, len(polars) + 1.0), alpha, cl, np.ones_like(cl))
+
+
+def stall_deg(table):
+    """Highest and lowest angle of each Reynolds number [deg]."""
+    return [np.degrees(angles).tolist() for angles in stall_angles(table)]
+
+
+def measured(alpha, high=12.0, low=-12.0, no_lift=0.0, plate=1.0):
+    """Lift that is linear up to near stall, largest there, lost over 8 deg more, and a plate's lift beyond."""
+    tops = (high, low)
+    attached = 0.105 * (alpha - no_lift)
+    for top in tops:
+        over = np.maximum(0.0, np.sign(top) * (alpha - top) + 3.0)
+        attached = attached - np.sign(top) * 0.105 / 6.0 * np.minimum(over, 6.0) ** 2  # level at the top
+    stalled = plate * np.sin(2.0 * np.radians(alpha))
+    share = np.interp(alpha, [low - 8.0, low - 1.0, high + 1.0, high + 8.0], [0.0, 1.0, 1.0, 0.0])
+    return share * attached + (1.0 - share) * stalled
+
+
 def test_stall_begins_where_lift_stops_to_grow():
     alpha = np.radians(np.arange(-180.0, 181.0, 1.0))
     peaks = np.radians([[9.0, -7.0], [14.0, -12.0]])
@@ -148,6 +175,82 @@ def test_stall_begins_where_lift_stops_to_grow():
     highest, lowest = stall_angles(table)
     np.testing.assert_allclose(highest, peaks[:, 0])
     np.testing.assert_allclose(lowest, peaks[:, 1])
+
+
+def test_stall_of_a_cambered_section_and_of_one_that_lifts_more_at_45_deg():
+    """Every Reynolds number by itself: its tops are where the curves were given them."""
+    tops = [(12.0, -12.0), (14.0, -8.0), (9.0, -14.0), (16.0, -10.0)]
+    plates = (0.6, 1.0, 1.4, 1.4)
+    table = table_of(
+        *(
+            lambda alpha, high=high, low=low, plate=plate: measured(alpha, high, low, -0.2 * (high + low), plate)
+            for (high, low), plate in zip(tops, plates, strict=True)
+        )
+    )
+    assert table.cl[2, 360 + 90] > 2.0 * table.cl[2, 360 + 18]  # at 45 deg, and at its top at 9 deg
+    np.testing.assert_allclose(stall_deg(table), np.transpose(tops), atol=1e-9)
+
+
+@pytest.mark.parametrize("depth", [1e-6, 1e-3, 0.05])
+def test_a_dent_is_no_stall(depth):
+    for place in (*range(1, 22), 30):  # anywhere up to 11 deg, and in stalled flow
+        cl = measured(np.degrees(HALF_DEGREES))
+        for side in (1, -1):
+            cl[360 + side * place] = cl[360 + side * (place - 1)] - side * depth
+        assert stall_deg(table_of(lambda _, cl=cl: cl)) == [[pytest.approx(12.0)], [pytest.approx(-12.0)]], place
+
+
+def test_plateaus_are_no_stall_but_for_the_highest():
+    """Equal neighbours of a file with few decimals; lift that stays at its top stops to grow where it gets there."""
+    steps = table_of(lambda alpha: np.round(measured(alpha), 1))
+    tops = np.array(stall_deg(steps))[:, 0]
+    assert steps.cl[0].max() == pytest.approx(np.interp(math.radians(tops[0]), HALF_DEGREES, steps.cl[0]))
+    assert 9.5 <= tops[0] <= 12.0
+    assert tops[1] == -tops[0]
+    level = table_of(lambda alpha: np.interp(alpha, [-90, -25, -11, 11, 25, 90], [0, -1.1, -1.1, 1.1, 1.1, 0]))
+    assert stall_deg(level) == [[pytest.approx(11.0)], [pytest.approx(-11.0)]]
+
+
+def test_noise_of_a_measurement_moves_stall_no_further_than_the_top_is_wide():
+    """Errors of 0.03, more than half of what lift gains in half a degree, reach places with 0.06 less than the top."""
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        noise = rng.uniform(-0.03, 0.03, len(HALF_DEGREES))
+        (highest,), (lowest,) = stall_deg(table_of(lambda alpha, noise=noise: measured(alpha) + noise))
+        clean = measured(np.array([highest, -lowest]))
+        assert (clean >= measured(np.array([12.0])) - 0.06).all()
+        assert 10.0 <= highest <= 14.0
+        assert -14.0 <= lowest <= -10.0
+
+
+def test_a_section_that_never_loses_its_lift_never_stalls():
+    never = table_of(lambda alpha: 0.1 * np.interp(np.abs(alpha), [0, 90, 180], [0, 90, 0]) * np.sign(alpha))
+    assert stall_deg(never) == [[pytest.approx(90.0)], [pytest.approx(-90.0)]]  # where the flow comes from behind
+    assert stall_deg(table_of(np.zeros_like)) == [[pytest.approx(180.0)], [pytest.approx(-180.0)]]
+
+
+@pytest.mark.parametrize(("last", "aspect_ratio"), [(8, 10.0), (14, 10.0), (14, 60.0)])
+def test_a_table_that_is_extended_is_stalled_beyond_its_end(tmp_path, last, aspect_ratio):
+    """Before stall too, and where a slender blade's lift rises on from there to that of a plate at 45 deg."""
+    rows = [
+        f"{reynolds},{alpha},{0.065 * alpha},0.02" for reynolds in (1e5, 1e6) for alpha in range(-last + 2, last + 1)
+    ]
+    path = tmp_path / "wing.csv"
+    path.write_text("\n".join(["reynolds,alpha_deg,cl,cd", *rows]) + "\n")
+    table = read_table(path, aspect_ratio)
+    highest, lowest = stall_deg(table)
+    assert highest == pytest.approx([last, last])
+    assert lowest == pytest.approx([2 - last, 2 - last])
+
+
+def test_a_dented_airfoil_does_not_stall_in_hover(sbs, hover):
+    """The default one with a dent of a millionth at 4.5 deg, of which more than half of the disc sees more."""
+    table = sbs.tables[0]
+    cl, zero = table.cl.copy(), len(table.alpha) // 2
+    for side in (1, -1):
+        cl[:, zero + 9 * side] = cl[:, zero + 8 * side] - side * 1e-6
+    dented = dataclasses.replace(sbs, tables=(dataclasses.replace(table, cl=cl),) * len(sbs.rotors))
+    assert [state.stalled_share for state in states(hovering(dented, hover).snapshot())] == [0.0, 0.0]
 
 
 def test_all_of_a_disc_that_stands_across_the_wind_is_stalled(sbs, hover):

@@ -29,6 +29,8 @@ REFLECTED_LIFT = -0.7  # cl of the reversed airfoil over cl of the airfoil at th
 TURNS = 3  # turns of the angle that the cells cover: -540..540 deg
 MIN_STEP_DEG, MAX_STEP_DEG = 0.01, 10.0
 STEP_TOLERANCE = 0.01  # of a step, for angles that were rounded in the file
+ATTACHED = math.radians(5.0)  # from the angle of no lift: so far the flow is taken to be attached
+SEPARATED = 0.5  # of the lift of attached flow: below, the flow has left the section
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,8 @@ class AirfoilTable(ByContent):
         Angles of attack [rad] from -pi to pi with one step.
     cl, cd : ndarray, shape (n_re, n_alpha)
         Lift and drag coefficient; the values at -pi and pi are equal.
+    given : (float, float)
+        Lowest and highest angle that was not made by `extend_polar` [rad].
     """
 
     name: str
@@ -51,10 +55,15 @@ class AirfoilTable(ByContent):
     alpha: Array
     cl: Array
     cd: Array
+    given: tuple[float, float] = (-math.pi, math.pi)
 
 
 def stall_angles(table: AirfoilTable) -> tuple[Array, Array]:
-    """Angles of attack at which lift first stops to grow away from zero: upwards and downwards.
+    """Angles of attack of the largest lift of attached flow, upwards and downwards: beyond them a section is stalled.
+
+    The flow is attached from the angle of no lift on as long as there is more than half of the lift that the slope
+    there gives; so neither dents and plateaus of the curve are stall, nor is the second rise of lift that a plate has
+    towards 45 deg its largest lift. What was made by `extend_polar` is stalled. A section without lift never stalls.
 
     Parameters
     ----------
@@ -63,12 +72,32 @@ def stall_angles(table: AirfoilTable) -> tuple[Array, Array]:
     Returns
     -------
     highest, lowest : ndarray, shape (n_re,)
-        Of each Reynolds number of the table [rad].
+        Of each Reynolds number of the table [rad]. Of equal largest lifts it is the one nearest to zero.
+
+    References
+    ----------
+    theory.md section 6.1. A plate whose flow is attached up to a share f of its chord has, after Kirchhoff, the lift of
+    attached flow times ((1 + sqrt f) / 2)^2, half of it at f = 0.17: J. G. Leishman, T. S. Beddoes, A semi-empirical
+    model for dynamic stall, Journal of the American Helicopter Society 34 (3), 1989.
     """
-    zero = len(table.alpha) // 2
-    growing, falling = np.diff(table.cl[:, zero:]) > 0.0, np.diff(table.cl[:, zero::-1]) < 0.0
-    above, below = (np.argmin(np.pad(part, ((0, 0), (0, 1))), axis=1) for part in (growing, falling))
-    return table.alpha[zero + above], table.alpha[zero - below]
+    lowest, highest = table.given
+    above = [_largest_lift(table.alpha, cl) for cl in table.cl]
+    below = [_largest_lift(table.alpha, -cl[::-1]) for cl in table.cl]
+    return np.minimum(above, highest), -np.minimum(below, -lowest)
+
+
+def _largest_lift(alpha: Array, cl: Array) -> float:
+    """Angle of the largest lift of attached flow, upwards from 0 [rad]; pi where there is no lift."""
+    attached = max(ATTACHED, 1.5 * (alpha[1] - alpha[0]))
+    near = np.abs(alpha) < attached
+    slope, at_zero = np.polyfit(alpha[near], cl[near], 1)
+    if slope <= 0.0:
+        return math.pi
+    angles, lift = alpha[len(alpha) // 2 :], cl[len(alpha) // 2 :]
+    linear = at_zero + slope * angles
+    is_attached = (linear < slope * attached) | (lift >= SEPARATED * linear)
+    end = int(np.argmin(np.append(is_attached, False)))
+    return float(angles[np.argmax(lift[:end])])
 
 
 def viterna(
@@ -191,7 +220,7 @@ def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
         return AirfoilTable(path.stem, reynolds, alpha, cl, cd)
     extended = [extend_polar(alpha, *polar, aspect_ratio) for polar in zip(cl, cd, strict=True)]
     circle, circle_cl, circle_cd = (np.array(rows) for rows in zip(*extended, strict=True))
-    return AirfoilTable(path.stem, reynolds, circle[0], circle_cl, circle_cd)
+    return AirfoilTable(path.stem, reynolds, circle[0], circle_cl, circle_cd, (float(alpha[0]), float(alpha[-1])))
 
 
 def _read_rows(path: Path) -> tuple[Array, list[int]]:

@@ -27,10 +27,11 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from sbs_msgs.msg import BodyState, FlightEvent, SimulationStatus
-from sbs_sim import Aircraft, trim
+from sbs_sim import Aircraft, linearize, simulate, trim
 from sbs_sim.cockpit import geometry
 from sbs_sim.cockpit.charts import PERIOD, History, body_charts, rotor_charts
 from sbs_sim.cockpit.gate import refusal
+from sbs_sim.cockpit.panels import KEYS, FlyPanel
 from sbs_sim.cockpit.playback import Recording, recordings
 from sbs_sim.cockpit.poles import Pole, pole_page
 from sbs_sim.cockpit.readouts import Status, condition_here, readout, source_line
@@ -485,6 +486,48 @@ def test_a_second_simulator_is_refused_and_a_second_cockpit_can_join(flying):
     joined = made.start("cockpit", arguments=["--attach", "--port", str(free_port())])
     made.client.until(lambda: "cockpit: http" in joined.output or not joined.running, "the second address")
     assert joined.interrupt() == 0, joined.output
+
+
+class Commanded:
+    """A pilot of a page that keeps what it is told to fly."""
+
+    def __init__(self):
+        self.controls = None
+
+    def command(self, controls):
+        self.controls = controls
+
+
+@pytest.mark.parametrize("file", ["sbs", ROOT / "test/data/tandem.yaml", ROOT / "test/data/tail_rotor.yaml"])
+def test_keys_of_the_page_do_what_they_say_on_any_aircraft(file):
+    """And the hints of the sliders tell what more of a control does, which is the other way on the tandem."""
+    aircraft = Aircraft.load(file)
+    model = linearize(aircraft)
+    server, pilot = serve("127.0.0.1", free_port()), Commanded()
+    try:
+        panel = FlyPanel(server, pilot, lambda: None)
+        panel.use(aircraft, model.control_effects)
+        promised = {"Y": ("w", -1), "H": ("w", 1), "L": ("p", 1), "J": ("p", -1)}
+        promised |= {"I": ("q", -1), "K": ("q", 1), "U": ("r", -1), "O": ("r", 1)}
+        assert sorted(promised) == sorted(key for keys in KEYS for key, _ in keys)
+        for key, (motion, sense) in promised.items():
+            panel.use(aircraft, model.control_effects)  # lets go
+            assert pilot.controls is None
+            panel.update(model.trim.swashplate, True, True)  # sliders where the flight has its controls
+            panel.press(key)
+            change = pilot.controls - model.trim.controls
+            moved = simulate(aircraft, model.trim, model.trim.controls + 3.0 * change, 0.06)[motion][-1]
+            assert sense * moved > 0.0, key
+        hints = [slider.hint for slider in panel.sliders]
+        said = [effect.words for effect in model.control_effects]
+        assert hints == [
+            f"more of it, in hover: {words}. Keys {less}, {more}"
+            for words, ((less, _), (more, _)) in zip(said, KEYS, strict=True)
+        ]
+        panel.use(aircraft, ())
+        assert all("not known" in slider.hint for slider in panel.sliders)
+    finally:
+        server.stop()
 
 
 def test_it_listens_on_this_machine_alone(flying):

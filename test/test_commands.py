@@ -124,6 +124,17 @@ def test_commands_say_where_the_model_does_not_hold(tmp_path):
     assert [bool(line["warnings"]) for line in csv.DictReader((tmp_path / "a.csv").open())] == [True, False]
 
 
+def test_trim_tells_which_way_the_controls_go():
+    """Of this aircraft, whose fourth control turns the nose to the right."""
+    file = Path(__file__).resolve().parent / "data" / "tandem.yaml"
+    for aircraft, yaw in ((file, "nose right"), (file.with_name("tail_rotor.yaml"), "nose left")):
+        text = output("trim", "--aircraft", aircraft)
+        assert re.search(r"^collective \[deg\] .* heave: up$", text, re.MULTILINE)
+        assert re.search(r"^lateral_cyclic \[deg\] .* roll: rolls right$", text, re.MULTILINE)
+        assert re.search(r"^longitudinal_cyclic \[deg\] .* pitch: nose down$", text, re.MULTILINE)
+        assert re.search(rf"^differential_longitudinal_cyclic \[deg\] .* yaw: {yaw}$", text, re.MULTILINE)
+
+
 def test_trim_of_a_file_with_unequal_rotors():
     file = Path(__file__).resolve().parent / "data" / "tandem.yaml"
     text = output("trim", "--aircraft", file)

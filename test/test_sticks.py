@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import aircraft_data
 
-from sbs_sim import linearize
+from sbs_sim import Aircraft, linearize, simulate
 from sbs_sim.aircraft import config_folder
 from sbs_sim.errors import PilotError
 from sbs_sim.model import state as S
@@ -19,6 +20,7 @@ from sbs_sim.pilot.sticks import RETURN_TIME, KeySticks, keys_of, shaped
 from sbs_sim.simulation import trimmed_state
 
 CONFIG = (config_folder() / "joystick.yaml").read_text()
+DATA = Path(__file__).resolve().parent / "data"
 PADS = ("gamepad", "xbox", "playstation", "transmitter")
 FULL = np.radians([3.0, 2.0, 2.0, 3.0])
 
@@ -124,8 +126,8 @@ def message(pad, **sticks):
 
 
 @pytest.mark.parametrize("pad", PADS)
-def test_every_pad_has_the_senses_of_the_controls(pad):
-    """Up is more collective, right rolls right, forward pushes, left turns the nose left."""
+def test_every_pad_has_the_senses_of_the_sticks(pad):
+    """Up, right, a push and the nose to the left are positive."""
     joystick = Joystick(JoystickFile.load("", pad))
     for i, name in enumerate(("up", "roll", "push", "yaw")):
         sticks = joystick.read(*message(pad, **{name: 1.0})).sticks
@@ -205,6 +207,63 @@ def test_a_file_or_pad_that_is_not_there_is_told(tmp_path):
     with pytest.raises(PilotError, match=f"pad = 'steering wheel': allowed are {', '.join(PADS)}"):
         JoystickFile.load("", "steering wheel")
     assert Path(config_folder() / "joystick.schema.json").is_file()
+
+
+# --- on any aircraft --------------------------------------------------------------------------------------------
+
+
+def mirrored_mixing():
+    """The default aircraft, every control of which but the collective has the other sign in the file."""
+    data = aircraft_data()
+    for rotor in data["rotors"]:
+        for factors in rotor["mixing"].values():
+            factors.update({name: -factor for name, factor in factors.items() if name != "collective"})
+    return Aircraft.from_dict(data)
+
+
+AIRCRAFT = {
+    "sbs": lambda: Aircraft.load("sbs"),
+    "mirrored mixing": mirrored_mixing,
+    "tandem": lambda: Aircraft.load(DATA / "tandem.yaml"),  # its fourth control turns the nose right
+    "tail rotor": lambda: Aircraft.load(DATA / "tail_rotor.yaml"),
+}
+KEYS_AND_MOTIONS = (  # what a key promises: velocity down, rates to the right, up, right
+    *(("w", "w", -1), ("s", "w", 1), ("right", "p", 1), ("j", "p", -1)),
+    *(("up", "q", -1), ("k", "q", 1), ("a", "r", -1), ("d", "r", 1)),
+)
+
+
+@pytest.mark.parametrize("name", AIRCRAFT)
+def test_keys_sticks_and_trims_do_what_they_say_on_any_aircraft(name):
+    """In flight: up, right, nose down, nose left, whatever the signs of its mixing."""
+    aircraft = AIRCRAFT[name]()
+    model = linearize(aircraft)
+    pilot = StickPilot(augmentation(model), FULL)
+    pilot.augmented = False
+    body = trimmed_state(aircraft, model.trim)
+    for key, motion, sense in KEYS_AND_MOTIONS:
+        pilot.take_over(model.trim.controls, model.trim.pitch, model.trim.roll)
+        keys = KeySticks()
+        keys.press(key)
+        pilot.sticks = keys.position
+        by_stick = pilot.controls(0.0, body)
+        assert sense * simulate(aircraft, model.trim, by_stick, 0.06)[motion][-1] > 0.0, key
+        pilot.sticks = np.zeros(4)
+        pilot.move_trim(FULL * keys.position)  # a press of a trim button moves the trim the same way
+        np.testing.assert_allclose(pilot.controls(0.0, body), by_stick)
+
+
+def test_augmentation_damps_every_aircraft():
+    """Its own gains have the signs of the aircraft: yaw rates of the tandem are held as those of others."""
+    for make in AIRCRAFT.values():
+        aircraft = make()
+        model = linearize(aircraft)
+        pilot = StickPilot(augmentation(model), FULL)
+        pilot.take_over(model.trim.controls, model.trim.pitch, model.trim.roll)
+        start = trimmed_state(aircraft, model.trim)
+        start[S.RATES + 2] = 0.2
+        free = simulate(aircraft, start, model.trim.controls, 0.5)["r"][-1]
+        assert fly(aircraft, start, pilot.controls, 0.5, delay=DELAY)["r"][-1] < free - 0.01
 
 
 # --- augmentation -----------------------------------------------------------------------------------------------

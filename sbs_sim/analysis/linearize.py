@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import export
+from sbs_sim.analysis.control_effects import ControlEffect, control_effects
 from sbs_sim.analysis.modes import Mode, modes
 from sbs_sim.analysis.trim import TrimPoint, trim
 from sbs_sim.content import ByContent
@@ -166,6 +167,17 @@ class LinearModel(ByContent):
             steps=self.steps[[*slow, *controls]],
             spread=self.spread[np.ix_(slow, [*slow, *controls])],
         )
+
+    @cached_property
+    def control_effects(self) -> tuple[ControlEffect, ...]:
+        """Which way more of each control moves the aircraft at once, rotors and inflow settled.
+
+        Raises
+        ------
+        LinearizationError
+            The model has not all states of the body, or its other states do not settle.
+        """
+        return control_effects(self.quasi_static().b, S.LINEAR_BODY_NAMES, self.control_names)
 
     def derivatives(self, quasi_static: bool = True) -> dict[str, float]:
         """Stability and control derivatives, normalised as in Padfield, Helicopter Flight Dynamics, section 4A.2.

@@ -1,5 +1,6 @@
 """The controls of the page: sliders, buttons, keys. What they do is done by a `Pilot`."""
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.control_effects import ControlEffect
 from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.cockpit.scene import Shown
 from sbs_sim.model.state import CONTROL_NAMES
@@ -21,14 +23,14 @@ SLIDER_STEP, KEY_STEP = 0.02, 0.1  # deg
 LARGEST_MAGNIFICATION = 20.0
 PACES = ("0.01", "0.05", "0.1", "0.25", "0.5", "1", "2", "as fast as possible")
 LABELS = ("Collective", "Lateral", "Longitudinal", "Differential")
-HINTS = (
-    "blade pitch of all rotors; up is more thrust. Keys H, Y",
-    "right is positive: rolls right side down. Keys J, L",
-    "push is positive: nose down. Keys I, K",
-    "positive tilts the right disc forward and the left one back: turns the nose left. Keys U, O",
+# Two keys of each stick, with what they do to any aircraft; they lie together, apart from those that move the camera.
+KEYS = (
+    (("H", "Collective down"), ("Y", "Collective up")),
+    (("J", "Roll left"), ("L", "Roll right")),
+    (("K", "Pull, nose up"), ("I", "Push, nose down")),
+    (("O", "Nose right"), ("U", "Nose left")),
 )
-# One key for less and one for more of each control; they lie together, apart from those that move the camera.
-KEYS = (("H", "Y"), ("J", "L"), ("K", "I"), ("O", "U"))
+UNKNOWN = "what more of it does to this aircraft is not known, for it has no hover"
 LIVE, NOTHING = "live", "choose a log"
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
 RECORD, END_RECORD = "Record", "End recording"
@@ -99,6 +101,7 @@ class FlyPanel:
         self._holding = False
         self._aircraft: Aircraft | None = None
         self._ranges = np.tile((-1.0, 1.0), (len(CONTROL_NAMES), 1))  # deg, until there is an aircraft
+        self._senses = np.ones(len(CONTROL_NAMES))  # of the controls, in what their keys are to do
         self._add_clock()
         self._add_controls()
         self._add_reset()
@@ -106,14 +109,18 @@ class FlyPanel:
         self._add_wind()
         self._add_keys()
 
-    def use(self, aircraft: Aircraft) -> None:
-        """Fly an aircraft from now on."""
+    def use(self, aircraft: Aircraft, effects: Sequence[ControlEffect]) -> None:
+        """Fly an aircraft from now on, whose controls have these effects; none of them if they are not known."""
         self._aircraft = aircraft
         self._ranges = np.degrees([aircraft.control_ranges[name] for name in CONTROL_NAMES])
         self._release()
-        for slider, (low, high) in zip(self._sliders, self._ranges.tolist(), strict=True):
+        for slider, (low, high) in zip(self.sliders, self._ranges.tolist(), strict=True):
             slider.min, slider.max = low, high
             slider.value = float(np.clip(slider.value, low, high))
+        self._senses = np.array([effect.sense for effect in effects] or [1.0] * len(CONTROL_NAMES))
+        said = [f"more of it, in hover: {effect.words}" for effect in effects] or [UNKNOWN] * len(CONTROL_NAMES)
+        for slider, words, ((less, _), (more, _)) in zip(self.sliders, said, KEYS, strict=True):
+            slider.hint = f"{words}. Keys {less}, {more}"
 
     # ------------------------------------------------------------------------------------------------------- parts
 
@@ -129,12 +136,12 @@ class FlyPanel:
     def _add_controls(self) -> None:
         gui = self._server.gui
         with gui.add_folder("Controls [deg]"):
-            self._sliders = []
+            self.sliders = []
             for i, label in enumerate(LABELS):
                 low, high = self._ranges[i]
-                slider = gui.add_slider(label, low, high, SLIDER_STEP, float(np.clip(0.0, low, high)), hint=HINTS[i])
+                slider = gui.add_slider(label, low, high, SLIDER_STEP, float(np.clip(0.0, low, high)))
                 slider.on_update(_by_user(self._on_slider))
-                self._sliders.append(slider)
+                self.sliders.append(slider)
             self._hold = gui.add_checkbox("Hold", False, hint="the page keeps commanding; untick to let others fly")
             self._hold.on_update(_by_user(self._on_hold))
 
@@ -168,10 +175,8 @@ class FlyPanel:
         add("Pause or go on", hotkey="space").on_trigger(lambda _: self._on_clock(PAUSE))
         add("Step", hotkey="N").on_trigger(lambda _: self._on_clock(STEP))
         add("Reset", hotkey="R", modifier="shift").on_trigger(lambda _: self._on_clock(RESET))
-        for i, (label, keys) in enumerate(zip(LABELS, KEYS, strict=True)):
-            for key, sign in zip(keys, (-1, 1), strict=True):
-                name = f"{label} {'less' if sign < 0 else 'more'}"
-                add(name, hotkey=key).on_trigger(lambda _, i=i, sign=sign: self._nudge(i, sign * KEY_STEP))
+        for key, name in itertools.chain.from_iterable(KEYS):
+            add(name, hotkey=key).on_trigger(lambda _, key=key: self.press(key))
 
     # ----------------------------------------------------------------------------------------------------- actions
 
@@ -200,7 +205,7 @@ class FlyPanel:
             self._say("Real-time factor", self._pilot.set_pace(factor))
 
     def _on_slider(self) -> None:
-        values = np.array([slider.value for slider in self._sliders])
+        values = np.array([slider.value for slider in self.sliders])
         if not np.isfinite(values).all():  # what is no page of ours may send anything
             self._say("Controls", (False, f"{values.tolist()} deg: allowed are finite numbers"))
             return
@@ -219,10 +224,15 @@ class FlyPanel:
         self._hold.value = False
         self._pilot.command(None)
 
-    def _nudge(self, which: int, change: float) -> None:
-        slider = self._sliders[which]
-        slider.value = float(np.clip(slider.value + change, *self._ranges[which]))
-        self._on_slider()
+    def press(self, key: str) -> None:
+        """Move the control of a key a step, the way that the key says whatever the sign of this aircraft's control."""
+        for slider, sense, bounds, ((less, _), (more, _)) in zip(
+            self.sliders, self._senses, self._ranges, KEYS, strict=True
+        ):
+            if key in (less, more):
+                change = KEY_STEP * sense * (1.0 if key == more else -1.0)
+                slider.value = float(np.clip(slider.value + change, *bounds))
+                self._on_slider()
 
     def _on_analysis(self, button: str) -> None:
         condition = self._here()
@@ -249,7 +259,7 @@ class FlyPanel:
         if self._holding or self._aircraft is None:
             return
         controls = self._aircraft.unmix(swashplate)
-        for slider, value in zip(self._sliders, np.degrees(controls), strict=True):
+        for slider, value in zip(self.sliders, np.degrees(controls), strict=True):
             rounded = round(float(value), 3)
             if not abs(slider.value - rounded) <= 0.5 * SLIDER_STEP:  # true for a NaN as well
                 slider.value = rounded

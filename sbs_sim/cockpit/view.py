@@ -1,13 +1,14 @@
 """The page: a server, its scene and panels, and one `draw` that shows what there is, live or from a log."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.control_effects import ControlEffect
 from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.cockpit.charts import ChartColumn, body_charts, rotor_charts
 from sbs_sim.cockpit.panels import CAMERAS, Answer, FlyPanel, LogPanel, Pilot, ViewPanel
@@ -114,15 +115,15 @@ class View:
 
     # -------------------------------------------------------------------------------------------------- what to show
 
-    def fly(self, aircraft: Aircraft) -> None:
-        """Offer a live flight of an aircraft, and show it if no log is being shown."""
+    def fly(self, aircraft: Aircraft, effects: Sequence[ControlEffect]) -> None:
+        """Offer a live flight of an aircraft with what its controls do, and show it if no log is being shown."""
         with self._lock:
             self._aircraft = aircraft
             if self._fly is None:
                 self._no_flight.remove()
                 with self._fly_tab:
                     self._fly = FlyPanel(self._server, self._pilot, self._here)
-            self._fly.use(aircraft)
+            self._fly.use(aircraft, effects)
             self._logs.offer_live(self._recording is None)
             if self._recording is None:
                 self._use(aircraft)

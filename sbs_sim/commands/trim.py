@@ -17,7 +17,10 @@ from sbs_sim.commands.common import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sbs_sim.aircraft import Aircraft
+    from sbs_sim.analysis.control_effects import ControlEffect
     from sbs_sim.analysis.trim import TrimPoint
 
 
@@ -46,27 +49,30 @@ def make_parser() -> Parser:
 
 def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.analysis.export import check_target, to_json, write
+    from sbs_sim.analysis.linearize import linearize
     from sbs_sim.analysis.trim import trim
 
     check_target(arguments.json)
     craft = aircraft(arguments)
     point = trim(craft, **flight(arguments), method=arguments.method)
-    print_trim(craft, point)
+    print_trim(craft, point, linearize(craft, point=point).control_effects)
     if arguments.json:
         write(arguments.json, to_json(point.to_dict()))
 
 
-def print_trim(craft: "Aircraft", point: "TrimPoint") -> None:
-    """Print a trim."""
-    from sbs_sim.model.state import CONTROL_NAMES
-
+def print_trim(craft: "Aircraft", point: "TrimPoint", effects: "Sequence[ControlEffect]") -> None:
+    """Print a trim, and which way more of each control moves the aircraft."""
     print_heading("trim", craft, point)
     print()
-    rows = [["pitch [deg]", fixed(point.pitch * DEGREES, 4), ""], ["roll [deg]", fixed(point.roll * DEGREES, 4), ""]]
-    for name, value in zip(CONTROL_NAMES, point.controls, strict=True):
-        low, high = (limit * DEGREES for limit in craft.control_ranges[name])
-        rows.append([f"{name} [deg]", fixed(value * DEGREES, 4), f"{low:g} to {high:g}"])
-    print_table(["body and controls", "", "range"], rows)
+    rows = [
+        ["pitch [deg]", fixed(point.pitch * DEGREES, 4), "", "nose up"],
+        ["roll [deg]", fixed(point.roll * DEGREES, 4), "", "right side down"],
+    ]
+    for effect, value in zip(effects, point.controls, strict=True):
+        low, high = (limit * DEGREES for limit in craft.control_ranges[effect.control])
+        moves = f"{effect.axis}: {effect.words}"
+        rows.append([f"{effect.control} [deg]", fixed(value * DEGREES, 4), f"{low:g} to {high:g}", moves])
+    print_table(["body and controls", "", "range", "more of it"], rows, left=(0, 3))
     print()
     print_table(["rotors", *(rotor.name for rotor in craft.rotors)], _rotor_rows(craft, point))
     print()

@@ -23,6 +23,8 @@ from viser import ViserServer
 
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, LinearModel, RotorStateArray, SimulationStatus
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.control_effects import ControlEffect
+from sbs_sim.analysis.linearize import linearize
 from sbs_sim.cockpit.gate import guarded
 from sbs_sim.cockpit.poles import Pole
 from sbs_sim.cockpit.readouts import Status
@@ -72,7 +74,8 @@ class Cockpit(Component):
         self._model: LinearModel | None = None
         self._pilot = RemotePilot(self)
         self._aircraft: Aircraft | None = None
-        self._found: Aircraft | None = None  # that another simulator has begun to fly
+        # that another simulator has begun to fly, and what its controls do
+        self._found: tuple[Aircraft, tuple[ControlEffect, ...]] | None = None
         self.failed = False
         for name, kind in MESSAGES.items():
             self.create_subscription(kind, name, lambda data, name=name: self._keep(name, data), NEWEST, raw=True)
@@ -161,9 +164,18 @@ class Cockpit(Component):
             elif not known and (name := self._pilot.aircraft()) is not None:
                 known = True
                 try:
-                    self._found = Aircraft.load(name)
+                    aircraft = Aircraft.load(name)
+                    self._found = aircraft, self._effects(aircraft)
                 except SbsError as error:
                     self.get_logger().error(f"the simulator's aircraft cannot be shown: {error}")
+
+    def _effects(self, aircraft: Aircraft) -> tuple[ControlEffect, ...]:
+        """What the controls of an aircraft do in hover; nothing for one that has no hover."""
+        try:
+            return linearize(aircraft).control_effects
+        except SbsError as error:
+            self.get_logger().warning(f"which way the keys move {aircraft.name} is not known: {error}")
+            return ()
 
     def _draw_all(self) -> None:
         host, port = self._place
@@ -187,8 +199,8 @@ class Cockpit(Component):
     def _draw(self, view: View, elapsed: float) -> None:
         found, self._found = self._found, None
         if found is not None:
-            self._aircraft = found
-            view.fly(found)
+            self._aircraft = found[0]
+            view.fly(*found)
         model, self._model = self._model, None
         if model is not None:
             poles, title = _poles(model)

@@ -39,12 +39,16 @@ class Augmentation(ByContent):
         Of all states of the linear model with it, sampled, `DELAY` ticks late [rad/s].
     margins : tuple of Margin, length 5
         There, at each control, and at all of them at once.
+    senses : ndarray, shape (4,)
+        1 for a control whose growth does what its stick is to do: up, roll to the right, nose down, nose left; -1 for
+        one that does the opposite. The mixing of the aircraft decides.
     """
 
     gains: Array
     lag_gains: Array
     poles: ComplexArray
     margins: tuple[Margin, ...]
+    senses: Array
 
 
 def augmentation(model: LinearModel) -> Augmentation:
@@ -72,7 +76,9 @@ def augmentation(model: LinearModel) -> Augmentation:
     worst = poles[np.argmax(poles.real)]
     if worst.real > math.log(2.0) / LEAST_DOUBLING_TIME:
         raise PilotError(f"augmented, the complete model has a pole at {worst:.3g} rad/s: fly another condition")
-    return Augmentation(gains[:, :n], gains[:, n:], poles, margins(plant, feedback, TICK, DELAY))
+    found = margins(plant, feedback, TICK, DELAY)
+    senses = np.array([effect.sense for effect in model.control_effects])
+    return Augmentation(gains[:, :n], gains[:, n:], poles, found, senses)
 
 
 def _compensator(gains: Array, lag_gains: Array) -> Compensator:
@@ -93,7 +99,7 @@ class StickPilot:
     Attributes
     ----------
     sticks : ndarray, shape (4,)
-        -1 to 1, positive as the controls.
+        -1 to 1, on any aircraft positive for up, roll to the right, a push (nose down), nose to the left.
     augmented : bool
     trim : ndarray, shape (4,)
         Controls with the sticks in the middle [rad].
@@ -114,8 +120,8 @@ class StickPilot:
         self._time: float | None = None
 
     def move_trim(self, change: ArrayLike) -> None:
-        """Add to the trim [rad], shape (4,)."""
-        self.trim = self.trim + np.asarray(change, dtype=float)
+        """Move the trim [rad], shape (4,), in the senses of the sticks."""
+        self.trim = self.trim + self._found.senses * np.asarray(change, dtype=float)
 
     def controls(self, time: float, body: ArrayLike) -> Array:
         """Pilot controls [rad], shape (4,), of a time [s] and a simulation state, or its first 13 values.
@@ -136,4 +142,4 @@ class StickPilot:
             wanted = -self._found.gains @ departure - self._found.lag_gains @ self._lagged
         new = -math.expm1(-elapsed / FILTER_TIME)
         self._lagged = self._lagged + new * (np.clip(wanted, -AUTHORITY, AUTHORITY) - self._lagged)
-        return self.trim + self._deflections * self.sticks + self._lagged
+        return self.trim + self._found.senses * self._deflections * self.sticks + self._lagged

@@ -88,9 +88,9 @@ class Reading(ByContent):
     Attributes
     ----------
     sticks : ndarray, shape (4,)
-        -1 to 1, positive as the controls.
+        -1 to 1, positive for up, roll to the right, a push, nose to the left.
     trim : ndarray, shape (4,)
-        Presses of the trim buttons since the message before, -1, 0 or 1.
+        Presses of the trim buttons since the message before, -1, 0 or 1, in the same senses.
     actions : tuple of str
         Buttons of `ACTIONS` that have been pressed since then.
     """

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 KEY_STEP = 0.1  # of full stick that one key moves
 RETURN_TIME = 0.7  # s in which a stick that no key holds goes back to the middle by a factor e
 COLLECTIVE = CONTROL_NAMES.index("collective")
-KEYS = {  # control and sense of a key, in the signs of Controls.msg: a push is positive, the nose to the left too
+KEYS = {  # stick and sense of a key: up, roll to the right, a push and the nose to the left are positive
     "w": ("collective", 1.0),
     "s": ("collective", -1.0),
     "a": ("differential_longitudinal_cyclic", 1.0),
@@ -61,7 +61,7 @@ class KeySticks:
     Attributes
     ----------
     position : ndarray, shape (4,)
-        -1 to 1, before dead zone and exponential.
+        Of the sticks in the order of the controls, -1 to 1, before dead zone and exponential.
     """
 
     def __init__(self) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import ClusterError, SbsError
-from sbs_sim.model.kernel import digest_of
+from sbs_sim.model.kernel_cache import digest_of
 from sbs_sim.versions import in_words, versions
 
 if TYPE_CHECKING:

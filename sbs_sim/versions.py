@@ -6,7 +6,7 @@ import platform
 from numba import config
 from numba.core.registry import cpu_target
 
-from sbs_sim.model.kernel import source_digest
+from sbs_sim.model.kernel_cache import source_digest
 
 TARGET = "target"
 FEATURES = "target_features"

@@ -5,7 +5,7 @@ import shutil
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.trim import trim
-from sbs_sim.model.kernel import cache_folder
+from sbs_sim.model.kernel_cache import cache_folder
 from sbs_sim.model.wind import Wind
 from sbs_sim.simulation import Simulation, simulate, trimmed_state
 
@@ -19,7 +19,7 @@ def main() -> None:
     linearize(aircraft, point=hover, method="paper")
     trim(aircraft, method="two_loop")
     folder = cache_folder()
-    for other in folder.parent.glob("kernels-*"):
+    for other in folder.parent.glob("kernels-*") if folder else ():
         if other != folder:
             shutil.rmtree(other, ignore_errors=True)
 

@@ -6,15 +6,15 @@ given the other's `Address` as an argument.
 """
 
 import contextlib
-import hashlib
 import os
-import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba.types import WrapperAddressProtocol
+
+from sbs_sim.model.kernel_cache import cache_folder
 
 # Everything that `fastmath` means except "there is no NaN" and "there is no infinity": the checks that
 # keep such numbers out of the state must survive the optimiser.
@@ -43,7 +43,10 @@ def _kept(function: Callable[..., Any], options: dict[str, Any]) -> Callable[...
     # numba names caches after the path of the source, and colcon's symlink install gives one file two paths
     real = os.path.realpath(function.__code__.co_filename)
     function.__code__ = function.__code__.replace(co_filename=real)
-    with _cache_in(cache_folder()):
+    folder = cache_folder()
+    if folder is None:
+        return numba.njit(**options)(function)
+    with _cache_in(folder):
         return numba.njit(cache=True, **options)(function)
 
 
@@ -78,42 +81,6 @@ class Address(WrapperAddressProtocol):
 def address(function: Any, *arguments: Any) -> Any:
     """`Address` of an entry; the entry itself where numba compiles nothing (NUMBA_DISABLE_JIT)."""
     return function if numba.config.DISABLE_JIT else Address(function, *arguments)
-
-
-def cache_folder() -> Path:
-    """Where the machine code of these very sources is kept.
-
-    numba asks only whether the file of the function itself has changed, not the files of what it calls.
-    A folder named after the content of all of them can never hold stale physics.
-    """
-    here, digest = Path(__file__).parent, source_digest()
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    if chosen:
-        return Path(chosen) / "sbs_sim" / f"kernels-{digest}"
-    beside = here / "__pycache__" / f"kernels-{digest}"
-    if _writable(beside):
-        return beside
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    kept = home / "sbs_sim" / f"kernels-{digest}"
-    return kept if _writable(kept) else Path(tempfile.gettempdir()) / f"sbs_sim-{os.getuid()}-{digest}"
-
-
-def source_digest() -> str:
-    """Digest of all sources of the compiled model, 16 hexadecimal digits."""
-    return digest_of(Path(__file__).parent.glob("*.py"))
-
-
-def digest_of(files: Iterable[Path]) -> str:
-    """Digest of the contents of files in the order of their paths, 16 hexadecimal digits."""
-    return hashlib.sha256(b"\0".join(path.read_bytes() for path in sorted(files))).hexdigest()[:16]
-
-
-def _writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return os.access(folder, os.W_OK)
 
 
 @contextlib.contextmanager

@@ -182,6 +182,14 @@ def test_ctrl_c_ends_it(flight):
     assert "Traceback" not in flight.hold.output
 
 
+def test_while_there_is_no_simulator_it_says_what_it_waits_for(tmp_path):
+    with world(next(DOMAINS), tmp_path) as made:
+        process = made.start("hover_hold", remaps=["__ns:=/left"])
+        line = f"waiting for /left/linearize in ROS_DOMAIN_ID {made.domain}: is a simulator running there?"
+        made.client.until(lambda: process.output.count(line) == 2, "two lines")
+        assert process.interrupt() == 0, process.output
+
+
 def test_without_a_simulator_it_ends_with_one_line(tmp_path):
     with world(next(DOMAINS), tmp_path) as made:
         process = made.start("hover_hold", patience=1.0)

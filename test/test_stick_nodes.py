@@ -14,11 +14,13 @@ rclpy = pytest.importorskip("rclpy")
 
 from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, Terminal, environment, world  # noqa: E402
 from sensor_msgs.msg import Joy  # noqa: E402
+from std_srvs.srv import SetBool  # noqa: E402
 
-from sbs_msgs.msg import BodyState, Controls  # noqa: E402
+from sbs_msgs.msg import BodyState, Controls, FlightEvent  # noqa: E402
 from sbs_msgs.srv import Reset  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.model.state import CONTROL_NAMES  # noqa: E402
+from sbs_sim.nodes.host import EVENT_QOS  # noqa: E402
 from sbs_sim.pilot.sticks import shaped  # noqa: E402
 
 TRIM = trim(Aircraft.load("sbs")).controls
@@ -90,6 +92,35 @@ def test_keys_fly_and_ctrl_c_gives_the_terminal_back(flight, terminal):
     assert teleop.wait() == 0
     assert teleop.modes == teleop.before
     assert "Traceback" not in teleop.output
+
+
+def test_without_a_flight_keys_and_joystick_say_what_they_wait_for(terminal, tmp_path):
+    """For a simulator, then for the end of its pause; the joystick for its own messages, too, while it flies."""
+    with world(next(DOMAINS), tmp_path) as made:
+        teleop, joystick = terminal(domain=made.domain), made.start("joystick")
+        line = f"waiting for /state in ROS_DOMAIN_ID {made.domain}: is a simulator running there?"
+        teleop.expect(line)
+        made.client.until(lambda: joystick.output.count(line) == 2, "two lines")
+        assert "the last controls stay" not in joystick.output  # there were none
+
+        made.client.watch("state", BodyState)
+        made.start("simulator", record="off")
+        made.client.next("state")
+        made.client.until(lambda: "flying, augmentation on" in joystick.output, "the take-over")
+        assert made.client.call(SetBool, "pause", data=True).success
+        late = made.start("joystick")
+        made.client.until(lambda: "waiting for the flight to go on: it is paused" in late.output, "a line of the pause")
+        made.client.until(lambda: "waiting for /joy in ROS_DOMAIN_ID" in joystick.output, "a line about joy")
+
+
+def test_sticks_of_another_aircraft_say_why_they_do_not_fly(tmp_path):
+    with world(next(DOMAINS), tmp_path) as made:
+        events = made.client.node.create_publisher(FlightEvent, "events", EVENT_QOS)
+        state = [0.0, 0.0, -10.0, 1.0] + [0.0] * 50
+        events.publish(FlightEvent(kind=FlightEvent.START, swashplate=[0.1] * 9, state=state))
+        joystick = made.start("joystick")
+        line = "waiting for another flight: the aircraft of this one has 3 rotors, sbs has 2; see aircraft:="
+        made.client.until(lambda: line in joystick.output, line)
 
 
 def test_q_ends_it_without_a_flight(terminal):

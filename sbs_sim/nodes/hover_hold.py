@@ -20,7 +20,7 @@ from sbs_sim.errors import PilotError, SbsError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.nodes.host import COMMAND_QOS, COMPLAINT_PERIOD, SERVICE_QOS, Parameter, Refusals, declare, run
-from sbs_sim.nodes.pilot import PilotNode
+from sbs_sim.nodes.pilot import WAITING_PERIOD, PilotNode
 from sbs_sim.nodes.pilot_conversions import hover_model, to_target
 from sbs_sim.pilot.hover_hold import LIMITS, HoverHold, design
 
@@ -53,14 +53,25 @@ class HoverHoldNode(PilotNode):
         """Linear model of hover, from the service."""
         client = self.create_client(Linearize, "linearize", qos_profile=SERVICE_QOS)
         self.get_logger().info("asking linearize for the model of hover")
-        end = time.monotonic() + patience
+        told = time.monotonic()
+        end = told + patience
         while not client.wait_for_service(ASKING):
-            if time.monotonic() > end:
+            now = time.monotonic()
+            if now > end:
                 raise PilotError(f"no service linearize within {patience:g} s: is a simulator running?")
+            if now - told > WAITING_PERIOD:
+                told = now
+                flies = self.count_publishers("state") > 0
+                whose = "a simulator flies, but no node analysis" if flies else "is a simulator running there?"
+                self.get_logger().info(f"waiting for {self.topic('linearize')}: {whose}")
         answer = client.call_async(Linearize.Request())
-        rclpy.spin_until_future_complete(self, answer, timeout_sec=max(ASKING, end - time.monotonic()))
-        if not answer.done():
-            raise PilotError(f"no answer of linearize within {patience:g} s")
+        while not answer.done():
+            left = end - time.monotonic()
+            rclpy.spin_until_future_complete(self, answer, timeout_sec=max(ASKING, min(left, WAITING_PERIOD)))
+            if not answer.done() and left <= 0.0:
+                raise PilotError(f"no answer of linearize within {patience:g} s")
+            if not answer.done():
+                self.get_logger().info(f"waiting for the answer of {self.topic('linearize')}")
         self.destroy_client(client)
         if not answer.result().success:
             raise PilotError(f"linearize: {answer.result().message}")

@@ -64,6 +64,12 @@ class JoystickNode(StickNode):
             self.get_logger().warning(f"no joy for {self._file.timeout:g} s: sticks released, the trim is held")
         return self._position
 
+    def waiting_for(self) -> str:
+        """What is missing before it flies, and the joystick if it was never heard."""
+        if (what := super().waiting_for()) or self._heard is not None:
+            return what
+        return f"{self.topic('joy')}: ros2 run joy game_controller_node publishes it"
+
     def problems(self) -> list[str]:
         """A joystick that is silent."""
         return ["no message on joy"] if self._silent or self._heard is None else []

@@ -20,6 +20,7 @@ from sbs_sim.nodes.pilot_conversions import check_event, controls_message
 Array = NDArray[np.float64]
 
 STALE = 0.5  # s of wall time without a state
+WAITING_PERIOD = 3.0  # s of wall time between lines that say what is waited for
 LATE = 1.0  # s of simulation time that an event may come after later states
 NEWEST_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)  # a queue of states would be a delay
 
@@ -47,7 +48,9 @@ class PilotNode(Component):
         self.create_subscription(FlightEvent, "events", self._on_event, EVENT_QOS)
         self.create_subscription(SimulationStatus, "status", self._on_status, STATE_QOS)
         self.create_subscription(BodyState, "state", self._on_state, NEWEST_QOS)
-        self.create_timer(HEALTH_PERIOD, self._look_after, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(HEALTH_PERIOD, self._look_after, clock=steady)
+        self.create_timer(WAITING_PERIOD, self._say_waiting, clock=steady)
 
     def fly(self, now: float, body: Array) -> Array | None:
         """Controls [rad], shape (4,), of a state; None is not to fly. SbsError refuses the state."""
@@ -55,6 +58,18 @@ class PilotNode(Component):
 
     def on_event(self, event: FlightEvent, is_new: bool) -> None:
         """Something acted on the flight: before this node has seen a state, or now (`is_new`)."""
+
+    def waiting_for(self) -> str:
+        """What this node waits for before it flies, in words; empty if for nothing."""
+        if self.body is None and self._paused:
+            return "the flight to go on: it is paused"
+        if self.body is None or self._stale:
+            return f"{self.topic('state')}: is a simulator running there?"
+        return ""
+
+    def topic(self, name: str) -> str:
+        """Full name of a topic or service, and where it is listened for."""
+        return f"{self.resolve_topic_name(name)} in ROS_DOMAIN_ID {self.context.get_domain_id()}"
 
     def problems(self) -> list[str]:
         """Problems to tell in diagnostics."""
@@ -86,10 +101,15 @@ class PilotNode(Component):
     def _on_status(self, message: SimulationStatus) -> None:
         self._paused = message.state == SimulationStatus.PAUSED
 
+    def _say_waiting(self) -> None:
+        """Say what is waited for, again and again."""
+        if what := self.waiting_for():
+            self.get_logger().info(f"waiting for {what}")
+
     def _look_after(self) -> None:
         """Say once when states stop to come."""
         stale = not self._paused and time.monotonic() - self._arrived > STALE
-        if stale and not self._stale:
+        if stale and not self._stale and self.body is not None:
             self.get_logger().warning(f"no state for {STALE:g} s: the last controls stay")
         self._stale = stale
         problems = ([f"no state for {STALE:g} s"] if stale else []) + self.problems()

@@ -40,6 +40,7 @@ class StickNode(PilotNode):
         self._found = augmentation(linearize(self._aircraft))
         self._stand: Array | None = None  # pilot controls of the latest event
         self._first_event = 0.0
+        self._other_rotors = 0  # of the aircraft that flies, if it is not the one that this node knows
         self._first: tuple[Array, float, float] | None = None  # trim at the take-over
 
     def make_pilot(self, deflections: ArrayLike) -> None:
@@ -72,6 +73,8 @@ class StickNode(PilotNode):
     def on_event(self, event: FlightEvent, is_new: bool) -> None:
         """Learn where the controls stand; after a reset they are another flight's."""
         angles = np.array(event.swashplate)
+        rotors = len(angles) // len(S.SWASHPLATE_NAMES)
+        self._other_rotors = rotors if rotors != len(self._aircraft.rotors) else 0
         if len(angles) != len(S.SWASHPLATE_NAMES) * len(self._aircraft.rotors):
             return
         if self._stand is None:
@@ -81,6 +84,16 @@ class StickNode(PilotNode):
         if self._first is not None and is_new and event.kind == FlightEvent.RESET and self._stand is not None:
             self.released()
             self._take_over(self._stand, np.array(event.state))
+
+    def waiting_for(self) -> str:
+        """What is missing before the controls can be taken over."""
+        if self._first is None and self._other_rotors:
+            own = f"{self._aircraft.name} has {len(self._aircraft.rotors)}"
+            return f"another flight: the aircraft of this one has {self._other_rotors} rotors, {own}; see aircraft:="
+        what = super().waiting_for()
+        if not what and self._first is None and self._stand is None:
+            return f"{self.topic('events')}, which tells where the controls stand"
+        return what
 
     def released(self) -> None:
         """Let go of the sticks, because the flight is another."""

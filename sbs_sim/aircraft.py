@@ -694,6 +694,9 @@ def _physical_problems(aircraft: Aircraft) -> list[str]:
     for i, rotor in enumerate(aircraft.rotors):
         problems += [f"rotors[{i}].{problem}" for problem in _rotor_problems(rotor)]
     names = [rotor.name for rotor in aircraft.rotors]
+    for path, name in (("name", aircraft.name), *((f"rotors[{i}].name", name) for i, name in enumerate(names))):
+        if not name.isprintable():  # they are shown in terminals and pages
+            problems.append(f"{path} = {name!r}: allowed are printable characters")
     problems += [f"rotors[{i}].name = {name!r}: used twice" for i, name in enumerate(names) if name in names[:i]]
     if problems:
         return problems

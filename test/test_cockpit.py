@@ -4,6 +4,8 @@ import contextlib
 import dataclasses
 import http.client
 import io
+import itertools
+import json
 import math
 import os
 import socket
@@ -18,6 +20,8 @@ import pytest
 import viser
 from hypothesis import given
 from hypothesis import strategies as st
+from markup import HOSTILE, Elements
+from matplotlib.text import Text
 from PIL import Image
 from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, environment, world
 from websockets.datastructures import Headers
@@ -26,22 +30,25 @@ from websockets.http11 import Request
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from sbs_msgs.msg import BodyState, FlightEvent, SimulationStatus
+from sbs_msgs.msg import BodyState, FlightEvent, LinearModel, Mode, SimulationStatus
 from sbs_sim import Aircraft, linearize, simulate, trim
+from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.cockpit import geometry
 from sbs_sim.cockpit.charts import PERIOD, History, body_charts, rotor_charts
 from sbs_sim.cockpit.gate import refusal
 from sbs_sim.cockpit.panels import KEYS, FlyPanel
 from sbs_sim.cockpit.playback import Recording, recordings
-from sbs_sim.cockpit.poles import Pole, pole_page
+from sbs_sim.cockpit.poles import NEAR, Pole, pole_figure, pole_page
 from sbs_sim.cockpit.readouts import Status, condition_here, readout, source_line
 from sbs_sim.cockpit.scene import COLOURS, colour_of
+from sbs_sim.cockpit.told import Trimmed, condition_words, model_page, trim_page, unsteady
 from sbs_sim.errors import RecordingError, SimulationError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.nodes.cockpit_node import serve
 from sbs_sim.nodes.conversions import StateMessages, snapshot_of
+from sbs_sim.nodes.host import LATCHED_QOS
 from sbs_sim.recording import read
 from sbs_sim.simulation import Simulation, trimmed_state
 
@@ -57,6 +64,10 @@ def snapshot_of_flight(airspeed=10.0, wind=(0.0, 0.0, 0.0), heading=0.0, **condi
     state = trimmed_state(AIRCRAFT, point, (3.0, -4.0, -25.0), heading, wind)
     simulation = Simulation(AIRCRAFT, state, point.swashplate)
     return simulation.snapshot(), point
+
+
+def craft(name):
+    return AIRCRAFT if name == "sbs" else Aircraft.load(ROOT / "test" / "data" / f"{name}.yaml")
 
 
 def tip(rotor, azimuth, flap=0.0, lag=0.0):
@@ -205,6 +216,58 @@ def test_the_pole_page_names_the_modes_and_tells_their_numbers():
     page = pole_page([Pole("phugoid", complex(0.1, 0.5)), Pole("roll & co", complex(-3.0, 0.0))], "hover")
     for part in ("phugoid", "roll &amp; co", "-0.20", "6.93", "0.231", "[rad/s]", "hover"):
         assert part in page
+
+
+@pytest.mark.parametrize(("name", "airspeed"), [("sbs", 0.0), ("sbs", 15.0), ("tandem", 5.0), ("tail_rotor", 8.0)])
+def test_no_name_of_a_pole_lies_on_another(name, airspeed):
+    model = linearize(craft(name), airspeed=airspeed)
+    figure = pole_figure([Pole(mode.name, mode.pole) for mode in model.modes])
+    figure.canvas.draw()
+    shown = set()
+    for axes in figure.axes:
+        boxes = [(text.get_text(), Text.get_window_extent(text)) for text in axes.texts]
+        for (one, box), (other, further) in itertools.combinations(boxes, 2):
+            assert not box.overlaps(further), (one, other)
+        for text, box in boxes:
+            assert axes.bbox.x0 <= box.x0 < box.x1 <= axes.bbox.x1, text
+        shown |= {line for text, _ in boxes for line in text.split("\n")}
+    assert {f"{i} {mode.name}" for i, mode in enumerate(model.modes, 1) if abs(mode.pole) <= NEAR} <= shown
+
+
+def test_a_long_name_leaves_the_map_its_room():
+    axes = pole_figure([Pole("x" * 200, complex(-1.0, 1.0)), Pole("roll", complex(-3.0, 0.0))]).axes[0]
+    assert axes.bbox.width > 0.7 * axes.figure.bbox.width
+
+
+def test_a_trim_is_shown_beside_a_flight_that_is_in_it_without_a_word_more():
+    snapshot, point = snapshot_of_flight(airspeed=12.0, turn_rate=0.3)
+    here = condition_here(snapshot)
+    trimmed = Trimmed(here, point.controls, point.pitch, point.roll, point.thrust.sum(), point.power.sum(), ())
+    assert unsteady(trimmed, snapshot) == []
+    page = Elements(trim_page(trimmed, snapshot, AIRCRAFT)).text
+    assert "Trim at 12 m/s, turn 17.2 deg/s" in page
+    collective = f"{math.degrees(point.controls[0]):.2f}"
+    assert f"collective{collective}{collective}deg" in page
+
+
+def test_a_trim_says_where_the_flight_is_not_in_it():
+    snapshot, point = snapshot_of_flight(airspeed=0.0)
+    state = snapshot.state.copy()
+    state[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(0.0, math.radians(50.0), 0.0)
+    state[S.RATES] = math.radians(10.0)
+    tilted = dataclasses.replace(snapshot, state=state)
+    trimmed = Trimmed(TrimCondition(), point.controls, point.pitch, point.roll, 0.0, 0.0, ("stalled",))
+    told = "The flight is not in this trim: pitch 50.0 deg instead of 0.0, p 10.0 deg/s instead of 0.0."
+    for page in (trim_page(trimmed, tilted, AIRCRAFT), model_page(trimmed, tilted)):
+        assert told in page
+        assert "stalled" in page
+
+
+def test_a_hover_is_at_no_airspeed_less_than_nothing():
+    snapshot, _ = snapshot_of_flight(airspeed=0.0)
+    state = snapshot.state.copy()
+    state[S.VELOCITY : S.RATES] = -1e-9
+    assert "-0" not in condition_words(condition_here(dataclasses.replace(snapshot, state=state)))
 
 
 # --- messages and logs ------------------------------------------------------------------------------------------
@@ -621,6 +684,14 @@ def test_a_log_that_is_none_is_refused_and_the_view_stays(flying, page):
     assert page.get_by_text("hover_step.mcap paused").count() == 1
 
 
+def hostile_aircraft(folder):
+    """File of the helicopter under a name that would be markup."""
+    text = (ROOT / "config" / "aircraft" / "sbs.yaml").read_text()
+    path = folder / "hostile.yaml"
+    path.write_text(text.replace("name: sbs\n", f"name: {json.dumps(HOSTILE)}\n"))
+    return path
+
+
 # The last one with the page, which it takes to another cockpit: two that draw at once would starve each other.
 def test_logs_are_shown_without_a_simulator_and_a_live_flight_when_there_is_one(tmp_path, page):
     logs = tmp_path / "mine"
@@ -640,12 +711,27 @@ def test_logs_are_shown_without_a_simulator_and_a_live_flight_when_there_is_one(
         page.get_by_role("tab", name="Logs").click()
         choose(page, "hover_step.mcap", "hover_step.mcap, no simulator")
         shown("hover_step.mcap paused")  # at its end
-        simulator = made.start("simulator", record="off")
+        path = logs / f"{HOSTILE.replace('/', '|')}.mcap"
+        simulator = made.start("simulator", aircraft=hostile_aircraft(tmp_path), record=f"'{path}'")
         shown("hover_step.mcap, a live flight goes on")
         choose(page, "live", "LIVE")
-        shown("sbs playing")
-        assert simulator.interrupt() == 0
+        shown(f"{HOSTILE} playing")
+        simulator.interrupt()
         shown("NO SIMULATOR")
+
+        # texts of others are no markup: of the log's file, of the aircraft in it, of the message of whoever publishes
+        button(page, "Look for new logs").click()
+        choose(page, path.name, f"{path.name} paused")
+        shown(f"{HOSTILE}, ")
+        (logs / f"broken {path.name}").write_bytes(b"nothing")
+        button(page, "Look for new logs").click()
+        choose(page, f"broken {path.name}", "Log refused")
+        model = LinearModel(method=HOSTILE)
+        model.modes = [Mode(name=HOSTILE, real=-0.1, imag=0.5)]
+        made.client.node.create_publisher(LinearModel, "linear_model", LATCHED_QOS).publish(model)
+        page.get_by_role("tab", name="Modes").click()
+        shown(f"Linear model at 0 m/s, {HOSTILE}")
+        assert page.locator("xss-mark, #xss, a[href*=xss], code, strong, em").count() == 0
         assert cockpit.interrupt() == 0, cockpit.output
 
 

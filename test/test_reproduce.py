@@ -1,5 +1,6 @@
 """The paper's results: bounds are those of the paper's printed numbers, or of what any rotor in hover must do."""
 
+import dataclasses
 import json
 import math
 import re
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers import Model, build
+from markup import HOSTILE, Elements, shown_as_text
 
 from sbs_sim.analysis.page import PAGE, inline_svg, page_text, save_page
 from sbs_sim.analysis.paper_tables import TABLES, contents, parse_pole, printed_tables
@@ -550,6 +552,16 @@ def test_ids_of_an_svg_become_its_own():
 
 def test_page_without_figures(report):
     assert Page(page_text(report, [])).open == []
+
+
+def test_names_of_aircraft_are_set_as_they_are(report):
+    own = {**report.conditions["aircraft"]["paper_reading"], "name": HOSTILE, "airfoil": [HOSTILE]}
+    conditions = {**report.conditions, "aircraft": {**report.conditions["aircraft"], "paper_reading": own}}
+    remarks = (f"Not the paper's aircraft: {HOSTILE}. a_0", *report.remarks)
+    page = page_text(dataclasses.replace(report, conditions=conditions, remarks=remarks), [])
+    assert shown_as_text(page)
+    assert Elements(page).text.count(HOSTILE) == 3
+    assert "a<sub>0</sub>" in page  # our own words are set
 
 
 def test_a_folder_that_cannot_be_is_one_line(report, tmp_path):

@@ -35,5 +35,6 @@ def batch_figure(batch: Batch, shown: Sequence[str] = SHOWN) -> Figure:
     panels.flat[0].legend(fontsize=8, framealpha=0.85)
     ended = len(batch.failed)
     title = f"{batch.cases[0].aircraft.name}: {len(batch.cases)} flights"
-    figure.suptitle(f"{title}, {ended} ended early" if ended else title)
+    # the name comes from a file: a $ begins no formula
+    figure.suptitle(f"{title}, {ended} ended early" if ended else title, parse_math=False)
     return figure

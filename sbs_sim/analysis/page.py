@@ -127,7 +127,7 @@ def page_text(report: Report, figures: Sequence[tuple[Drawing, str]]) -> str:
         Each with its SVG.
     """
     sections = [
-        ("remarks", "Remarks", _list(report.remarks)),
+        ("remarks", "Remarks", _remarks(report)),
         ("tables", "Tables", "\n".join(_comparison(name, table) for name, table in report.tables.items())),
         ("trim", "Trim over forward speed", _forward(report)),
         ("facts", "What explains the differences", "\n".join(_plain_table(*table) for table in f.fact_tables(report))),
@@ -161,8 +161,15 @@ complete model, and of the assumptions under which the printed poles come out (t
 """
 
 
-def _list(texts: Sequence[str]) -> str:
-    return "<ul>" + "".join(f"<li>{_text(text)}</li>" for text in texts) + "</ul>"
+def _remarks(report: Report) -> str:
+    """Remarks; the names of aircraft in them come from files and are not set like our own words."""
+    names = {own["name"] for own in report.conditions["aircraft"].values()}
+    pattern = rf"(?<!\w)({'|'.join(re.escape(name) for name in names)})(?!\w)"
+    items = [
+        "".join(escape(part) if part in names else _text(part) for part in re.split(pattern, text))
+        for text in report.remarks
+    ]
+    return "<ul>" + "".join(f"<li>{item}</li>" for item in items) + "</ul>"
 
 
 def _text(text: str) -> str:
@@ -234,16 +241,20 @@ def _note(entry: Entry, numbers: dict[str, int], table: str) -> str:
     return f'<a href="#{table}-{number}">{number}</a>' if number else ""
 
 
-def _cell(tag: str, text: str, name: str = "", more: str = "") -> str:
+def _cell(tag: str, text: str, name: str = "", more: str = "", to_html: Callable[[str], str] = _text) -> str:
     attributes = (f' class="{name}"' if name else "") + (f" {more}" if more else "")
-    return f"<{tag}{attributes}>{_text(text)}</{tag}>"
+    return f"<{tag}{attributes}>{to_html(text)}</{tag}>"
 
 
-def _plain_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def _plain_table(
+    title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], to_html: Callable[[str], str] = _text
+) -> str:
     """Table of texts; columns of numbers stand at the right."""
     right = {i for i, cell in enumerate(rows[-1]) if re.fullmatch(r"-?[\d.]+\*?", cell)}
     body = "\n".join(
-        "<tr>" + "".join(_cell("td", cell, "number" if i in right else "") for i, cell in enumerate(row)) + "</tr>"
+        "<tr>"
+        + "".join(_cell("td", cell, "number" if i in right else "", "", to_html) for i, cell in enumerate(row))
+        + "</tr>"
         for row in rows
     )
     return (
@@ -331,7 +342,7 @@ def _circumstances(report: Report) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in report.versions.items())
     return (
         f"<p>Hover, averages over {given['azimuth_count']} azimuths. {fidelity}.</p>\n"
-        + _plain_table("Aircraft", headings, rows)
+        + _plain_table("Aircraft", headings, rows, escape)  # names of files are not set like ours
         + f'\n<p class="meta">{escape(versions)}</p>'
     )
 

@@ -5,11 +5,9 @@ their dashes.
 """
 
 import io
-import math
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,8 +15,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.text import Annotation, Text
-from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from sbs_sim.analysis.export import write
@@ -26,6 +22,7 @@ from sbs_sim.analysis.modes import Mode
 from sbs_sim.analysis.sweep import CONDITIONS, Sweep
 from sbs_sim.errors import ExportError
 from sbs_sim.model.state import CONTROL_NAMES, part_of
+from sbs_sim.plot_labels import PLAIN, name_poles
 from sbs_sim.plot_style import COLOURS, DASHES
 
 Array = NDArray[np.float64]
@@ -33,10 +30,6 @@ Array = NDArray[np.float64]
 FORMATS = ("png", "svg")
 DOTS_PER_INCH = 150
 LEAST_ANGLE, LEAST_SHARE = 1.0, 0.05  # that an axis covers: deg, share of the largest value
-LABEL_SIZE = 7.5  # points
-SAME_PLACE = 8.0  # pixels between poles that cannot be told apart
-LABEL_ANGLES = (15, -15, 165, -165, 60, -60, 120, -120, 90, -90)  # deg, in the order of preference
-LABEL_DISTANCES = (8, 16, 26, 38, 52, 70, 90, 115)  # points
 
 
 def save_plots(sweep: Sweep, folder: str | Path) -> list[Path]:
@@ -135,7 +128,7 @@ def _curves(axes: Axes, sweep: Sweep, curves: dict[str, Array], label: str, leas
         axes.plot(
             missing, [0.02] * len(missing), "x", color="0.4", transform=axes.get_xaxis_transform(), label="no trim"
         )
-    axes.set_xlabel(_parameter_label(sweep))
+    axes.set_xlabel(_parameter_label(sweep), **PLAIN)
     axes.set_ylabel(label)
     low, high = axes.get_ylim()
     if high - low < least:  # or rounding would fill the panel
@@ -164,7 +157,7 @@ def root_locus_figure(sweep: Sweep) -> Figure:
         axes.set_ylabel("imaginary part [rad/s]")
         axes.grid(True, color="0.85", linewidth=0.6)
         axes.margins(0.12, 0.12)
-    figure.colorbar(scale, ax=panels, label=_parameter_label(sweep), shrink=0.9, pad=0.01)
+    figure.colorbar(scale, ax=panels, shrink=0.9, pad=0.01).set_label(_parameter_label(sweep), **PLAIN)
     canvas.draw()  # settles the layout, which the places of the names depend on
     for axes, names in zip(panels, chosen, strict=True):
         _name_loci(axes, {name: sweep.loci[name] for name in names})
@@ -191,75 +184,6 @@ def _locus(axes: Axes, sweep: Sweep, poles: NDArray[np.complex128], scale: Scala
 
 
 def _name_loci(axes: Axes, loci: dict[str, NDArray[np.complex128]]) -> None:
-    """Write every name beside the last pole of its locus, where it covers no other name and few poles."""
+    """Write every name beside the last pole of its locus."""
     every = np.concatenate([*loci.values(), np.empty(0, complex)])
-    dots = _pixels(axes, every[~np.isnan(every)])
-    taken: list[Bbox] = []
-    for end, names in _together(axes, loci):
-        label = axes.annotate(
-            "\n".join(names),
-            (end.real, end.imag),
-            xytext=(0.0, 0.0),
-            textcoords="offset points",
-            fontsize=LABEL_SIZE,
-            linespacing=1.1,
-            va="center",
-            arrowprops={"arrowstyle": "-", "color": "0.5", "linewidth": 0.5, "shrinkA": 0.0, "shrinkB": 2.0},
-            zorder=3,
-        )
-        taken.append(_place(label, axes.bbox, dots, taken))
-
-
-def _pixels(axes: Axes, poles: NDArray[np.complex128]) -> Array:
-    return np.asarray(axes.transData.transform(np.column_stack([poles.real, poles.imag])))
-
-
-def _together(axes: Axes, loci: dict[str, NDArray[np.complex128]]) -> list[tuple[complex, list[str]]]:
-    """Last poles, the uppermost first, each with the names of all that end there as far as one can see."""
-    ends = {name: poles[~np.isnan(poles)][-1] for name, poles in loci.items()}
-    groups: list[tuple[complex, list[str]]] = []
-    for name in sorted(ends, key=lambda name: (-ends[name].imag, -ends[name].real)):
-        for end, names in groups:
-            if np.abs(np.diff(_pixels(axes, np.array([end, ends[name]])), axis=0)).max() < SAME_PLACE:
-                names.append(name)
-                break
-        else:
-            groups.append((ends[name], [name]))
-    return groups
-
-
-def _place(label: Annotation, frame: Bbox, dots: Array, taken: list[Bbox]) -> Bbox:
-    """Move a label to the best of the places to try; the box that it fills."""
-    figure = label.get_figure(root=True)
-    axes = label.axes
-    assert isinstance(axes, Axes)
-    assert figure is not None
-    dots_per_point = figure.dpi / 72.0
-    origin = _pixels(axes, np.array([complex(*label.xy)]))[0]
-    # as a text: the box of an annotation has its line in it
-    size = Text.get_window_extent(label, figure.canvas.get_renderer())  # type: ignore[attr-defined]
-    places = [(distance, math.radians(angle)) for distance in LABEL_DISTANCES for angle in LABEL_ANGLES]
-    costs = []
-    for distance, angle in places:
-        along, up = math.cos(angle), math.sin(angle)
-        x, y = origin + distance * dots_per_point * np.array([along, up])
-        x -= {"left": 0.0, "center": 0.5, "right": 1.0}[_side(along)] * size.width
-        box = Bbox.from_bounds(x, y - size.height / 2, size.width, size.height).padded(1.0)
-        costs.append((_cost(box, frame, dots, taken) + distance / 50.0, box))
-    best = min(range(len(costs)), key=lambda i: costs[i][0])
-    distance, angle = places[best]
-    label.set_position((distance * math.cos(angle), distance * math.sin(angle)))
-    label.set_horizontalalignment(_side(math.cos(angle)))
-    return costs[best][1]
-
-
-def _side(along: float) -> Literal["left", "center", "right"]:
-    """Side of a text that is next to its pole."""
-    return "left" if along > 0.1 else "right" if along < -0.1 else "center"
-
-
-def _cost(box: Bbox, frame: Bbox, dots: Array, taken: list[Bbox]) -> float:
-    """How bad a place is: names on names, outside of the frame, poles covered."""
-    inside = (dots[:, 0] > box.x0) & (dots[:, 0] < box.x1) & (dots[:, 1] > box.y0) & (dots[:, 1] < box.y1)
-    outside = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
-    return 20.0 * sum(box.overlaps(other) for other in taken) + 50.0 * outside + float(inside.sum())
+    name_poles(axes, {name: poles[~np.isnan(poles)][-1] for name, poles in loci.items()}, every[~np.isnan(every)])

@@ -13,8 +13,12 @@ from viser import ViserServer
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
 from sbs_sim.analysis.trim import TrimCondition
+from sbs_sim.cockpit.readouts import condition_here
 from sbs_sim.cockpit.scene import Shown
+from sbs_sim.cockpit.told import Trimmed, line, model_page, trim_page
+from sbs_sim.errors import SbsError
 from sbs_sim.model.state import CONTROL_NAMES
+from sbs_sim.simulation import Snapshot
 
 Array = NDArray[np.float64]
 Answer = tuple[bool, str]  # whether it was done, and what is to be said
@@ -34,6 +38,7 @@ UNKNOWN = "what more of it does to this aircraft is not known, for it has no hov
 LIVE, NOTHING = "live", "choose a log"
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
 RECORD, END_RECORD = "Record", "End recording"
+TRIM, LINEARIZE = "Trim here", "Linearize here"
 
 
 class Pilot(Protocol):
@@ -60,11 +65,11 @@ class Pilot(Protocol):
     def record(self, on: bool) -> Answer:
         """Begin a log in the default folder, or end the present one."""
 
-    def trim(self, condition: TrimCondition) -> Answer:
-        """Trim a condition and tell the result."""
+    def trim(self, condition: TrimCondition) -> tuple[Trimmed | None, str]:
+        """Trim a condition; or why there is no trim."""
 
-    def linearize(self, condition: TrimCondition) -> Answer:
-        """Linearize about a condition; the model comes by itself."""
+    def linearize(self, condition: TrimCondition) -> tuple[Trimmed | None, str]:
+        """Linearize about a condition: its trim, or why there is none; the model comes by itself."""
 
 
 def _by_user(act: Callable[[], None]) -> Callable[[Any], None]:
@@ -91,10 +96,10 @@ class FlyPanel:
     server : ViserServer
     pilot : Pilot
     here : callable
-        Condition of the flight right now, None before there is one.
+        The flight right now, None before there is one.
     """
 
-    def __init__(self, server: ViserServer, pilot: Pilot, here: Callable[[], TrimCondition | None]) -> None:
+    def __init__(self, server: ViserServer, pilot: Pilot, here: Callable[[], Snapshot | None]) -> None:
         self._server, self._pilot, self._here = server, pilot, here
         self._paused = False
         self._recording = False
@@ -156,9 +161,9 @@ class FlyPanel:
 
     def _add_analysis(self) -> None:
         gui = self._server.gui
-        buttons = gui.add_button_group("Analyse", ("Trim here", "Linearize here"))
+        buttons = gui.add_button_group("Analyse", (TRIM, LINEARIZE))
         buttons.on_click(lambda event: self._on_analysis(event.target.value))
-        self._result = gui.add_markdown("")
+        self._result = gui.add_html("")
 
     def _add_wind(self) -> None:
         gui = self._server.gui
@@ -235,12 +240,21 @@ class FlyPanel:
                 self._on_slider()
 
     def _on_analysis(self, button: str) -> None:
-        condition = self._here()
-        if condition is None:
+        snapshot, aircraft = self._here(), self._aircraft
+        if snapshot is None or aircraft is None:
             return
-        done, message = self._pilot.trim(condition) if button == "Trim here" else self._pilot.linearize(condition)
-        self._result.content = message if done else ""
-        self._say(button, (done, message))
+        try:
+            condition = condition_here(snapshot)
+        except SbsError as error:
+            self._say(button, (False, str(error)))
+            return
+        if button == TRIM:
+            trimmed, message = self._pilot.trim(condition)
+            self._result.content = trim_page(trimmed, snapshot, aircraft) if trimmed else ""
+        else:
+            trimmed, message = self._pilot.linearize(condition)
+            self._result.content = model_page(trimmed, snapshot) if trimmed else ""
+        self._say(button, (trimmed is not None, message))
 
     def _on_wind(self) -> None:
         velocity = np.array([number.value for number in self._wind])
@@ -295,7 +309,7 @@ class LogPanel:
         self.place = gui.add_slider("Time [s]", 0.0, 1.0, 0.01, 0.0)
         self.moved = False
         self.place.on_update(_by_user(self._on_place))
-        self.message = gui.add_markdown("")
+        self.message = gui.add_html("")
         self.enable(False)
 
     def _names(self) -> list[str]:
@@ -318,7 +332,7 @@ class LogPanel:
 
     def _on_pick(self) -> None:
         done, message = self._choose(self._paths.get(self._pick.value))
-        self.message.content = message
+        self.message.content = line(message)
         if not done:
             _notify(self._server, "Log refused", message)
 

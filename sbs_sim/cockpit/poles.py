@@ -2,7 +2,7 @@
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -11,11 +11,22 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from sbs_sim.plot_labels import name_poles
 
 STABLE, UNSTABLE = "#0072B2", "#D55E00"
-NAME_SHIFT = 9  # points
+TEXT_SIZE = 7.0  # points
+LONGEST = 32  # letters of a name in the map
 NEAR = 8.0  # rad/s: the poles of the body lie within, those of the rotors without
-SETTINGS = {"svg.fonttype": "none", "svg.hashsalt": "sbs_sim", "font.size": 8.0, "font.family": "sans-serif"}
+# names of modes come from whoever publishes them: a $ begins no formula
+SETTINGS = {
+    "text.parse_math": False,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "sbs_sim",
+    "font.size": 8.0,
+    "font.family": "sans-serif",
+}
 
 
 @dataclass(frozen=True)
@@ -61,54 +72,49 @@ def pole_page(poles: Sequence[Pole], title: str) -> str:
 
 
 def pole_figure(poles: Sequence[Pole]) -> Figure:
-    """All poles, and those near the origin, upper half of the complex plane."""
+    """All poles by number, and those near the origin by name, upper half of the complex plane."""
+    numbered = {f"{i} {pole.name}": pole.value for i, pole in enumerate(poles, 1)}
+    names = {name: value for name, value in numbered.items() if abs(value) <= NEAR}
+    numbers = {name.split()[0]: value for name, value in numbered.items()}
     with rc_context(SETTINGS):  # type: ignore[arg-type]
         figure = Figure(figsize=(3.5, 4.4), layout="constrained")
-        FigureCanvasAgg(figure)
+        canvas = FigureCanvasAgg(figure)
         near, wide = figure.subplots(2, 1)
-        _draw(near, [(i, pole) for i, pole in enumerate(poles, 1) if abs(pole.value) <= NEAR], True)
-        _draw(wide, list(enumerate(poles, 1)), False)
-        near.set_title(f"within {NEAR:g} rad/s", fontsize=8, loc="left")
-        wide.set_title("all", fontsize=8, loc="left")
+        _draw(near, list(names.values()), f"within {NEAR:g} rad/s")
+        _draw(wide, list(numbers.values()), "all")
         wide.set_xlabel("real part [1/s]")
+        canvas.draw()  # settles the layout, which the places of the names depend on
+        name_poles(near, {_short(name): value for name, value in names.items()}, _array(names), TEXT_SIZE)
+        name_poles(wide, numbers, _array(numbers), TEXT_SIZE, _ranges)
     return figure
 
 
-def _draw(axes: Axes, poles: Sequence[tuple[int, Pole]], with_names: bool) -> None:
-    """Crosses with their numbers, and with their names where there is room for them."""
+def _array(poles: Mapping[str, complex]) -> NDArray[np.complex128]:
+    return np.array(list(poles.values()), dtype=complex)
+
+
+def _short(name: str) -> str:
+    """A name that fits; the table has all of it."""
+    return name if len(name) <= LONGEST else f"{name[:LONGEST]}…"
+
+
+def _draw(axes: Axes, poles: Sequence[complex], title: str) -> None:
+    """Crosses."""
     axes.axvline(0.0, color="#9aa3ab", linewidth=0.8)
     axes.grid(color="#e3e6e9", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.set_ylabel("imaginary part [rad/s]")
-    places: dict[tuple[float, float], list[tuple[int, Pole]]] = {}
-    scale = max((abs(pole.value) for _, pole in poles), default=1.0) or 1.0
-    for number, pole in poles:
-        colour = UNSTABLE if pole.value.real > 0 else STABLE
-        axes.plot(pole.value.real, pole.value.imag, "x", color=colour, markersize=5, markeredgewidth=1.3)
-        place = (round(pole.value.real / scale, 1), round(pole.value.imag / scale, 1))
-        places.setdefault(place, []).append((number, pole))
-    axes.margins(0.14, 0.18)
-    middle = sum(axes.get_xlim()) / 2
-    for i, together in enumerate(places.values()):
-        value = np.mean([pole.value for _, pole in together])
-        text = _numbers([number for number, _ in together])
-        if with_names:
-            text = "\n".join(f"{number} {pole.name}" for number, pole in reversed(together))
-        left = bool(value.real > middle)
-        axes.annotate(
-            text,
-            (value.real, value.imag),
-            xytext=(-5 if left else 5, 3 + NAME_SHIFT * (i % 2 if with_names else 0)),  # neighbours at two heights
-            ha="right" if left else "left",
-            textcoords="offset points",
-            fontsize=7,
-        )
+    axes.set_title(title, fontsize=8, loc="left")
+    for value in poles:
+        colour = UNSTABLE if value.real > 0 else STABLE
+        axes.plot(value.real, value.imag, "x", color=colour, markersize=5, markeredgewidth=1.3)
+    axes.margins(0.2, 0.22)
 
 
-def _numbers(numbers: Sequence[int]) -> str:
+def _ranges(names: Sequence[str]) -> str:
     """Numbers, those that follow each other as a range."""
     runs: list[list[int]] = []
-    for number in numbers:
+    for number in sorted(int(name) for name in names):
         if runs and number == runs[-1][-1] + 1:
             runs[-1].append(number)
         else:

@@ -63,10 +63,10 @@ def condition_here(snapshot: Snapshot) -> TrimCondition:
     _, q, r = snapshot.state[S.RATES : S.RATES + 3]
     turn = (q * math.sin(roll) + r * math.cos(roll)) / math.cos(pitch)  # Stevens and Lewis, eq. (1.4-4)
     return TrimCondition(
-        round(airspeed if abs(airspeed) > SLOW else forward, FLOW_DIGITS),
-        round(float(-down), FLOW_DIGITS),
-        round(sideslip, ANGLE_DIGITS),
-        round(turn, ANGLE_DIGITS),
+        round(airspeed if abs(airspeed) > SLOW else forward, FLOW_DIGITS) + 0.0,  # without a minus before a zero
+        round(float(-down), FLOW_DIGITS) + 0.0,
+        round(sideslip, ANGLE_DIGITS) + 0.0,
+        round(turn, ANGLE_DIGITS) + 0.0,
     )
 
 

@@ -9,12 +9,11 @@ from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
-from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.cockpit.charts import ChartColumn, body_charts, rotor_charts
 from sbs_sim.cockpit.panels import CAMERAS, Answer, FlyPanel, LogPanel, Pilot, ViewPanel
 from sbs_sim.cockpit.playback import Recording, recordings
 from sbs_sim.cockpit.poles import Pole, pole_page
-from sbs_sim.cockpit.readouts import Status, condition_here, readout, source_line
+from sbs_sim.cockpit.readouts import Status, readout, source_line
 from sbs_sim.cockpit.scene import ARROW_OF_MOMENT, COLOURS, MOMENT, PATH, THRUST, Scene, Shown
 from sbs_sim.errors import SbsError
 from sbs_sim.simulation import Snapshot
@@ -150,9 +149,9 @@ class View:
         """Show the poles of a linear model."""
         self._modes.content = pole_page(poles, title)
 
-    def _here(self) -> TrimCondition | None:
+    def _here(self) -> Snapshot | None:
         live = self._live()
-        return None if live is None else condition_here(live.snapshot)
+        return None if live is None else live.snapshot
 
     def _use(self, aircraft: Aircraft) -> None:
         """Draw an aircraft, from now on and without what was before."""

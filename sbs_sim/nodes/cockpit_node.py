@@ -28,6 +28,7 @@ from sbs_sim.analysis.linearize import linearize
 from sbs_sim.cockpit.gate import guarded
 from sbs_sim.cockpit.poles import Pole
 from sbs_sim.cockpit.readouts import Status
+from sbs_sim.cockpit.told import condition_words
 from sbs_sim.cockpit.view import FRAME_PERIOD, Live, View
 from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.model.state import SWASHPLATE_NAMES
@@ -237,8 +238,7 @@ def _status(told: SimulationStatus) -> Status:
 
 def _poles(model: LinearModel) -> tuple[list[Pole], str]:
     """Poles of a linear model, and what it is about."""
-    condition = model.trim.condition
-    title = f"Linear model at {condition.airspeed:g} m/s, {model.method}"
+    title = f"Linear model at {condition_words(model.trim.condition)}, {model.method}"
     return [Pole(mode.name, complex(mode.real, mode.imag)) for mode in model.modes], title
 
 

@@ -1,10 +1,8 @@
 """A pilot who asks a simulator over ROS: the calls behind the buttons of the cockpit."""
 
 import dataclasses
-import math
-import re
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,9 +12,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool
 
-from sbs_msgs.msg import Controls
+from sbs_msgs.msg import Controls, TrimPoint
 from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim
 from sbs_sim.analysis.trim import TrimCondition
+from sbs_sim.cockpit.told import Trimmed
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.nodes.conversions import controls_of
 from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS
@@ -24,7 +23,6 @@ from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS
 Array = NDArray[np.float64]
 Answer = tuple[bool, str]
 
-MARKUP = re.compile(r"[^A-Za-z0-9 .,:]")
 PATIENCE = 10.0  # s for an answer
 ANALYSIS_PATIENCE = 60.0  # s for a trim or a linear model
 COMMAND_PERIOD = 0.1  # s between commands that hold the controls
@@ -124,61 +122,31 @@ class RemotePilot:
         """Begin a log in the default folder, or end the present one."""
         return self._ask("record", Record.Request(record=on))
 
-    def trim(self, condition: TrimCondition) -> Answer:
-        """Trim a condition and tell the result."""
+    def trim(self, condition: TrimCondition) -> tuple[Trimmed | None, str]:
+        """Trim a condition."""
         response = self._call("trim", Trim.Request(**_condition(condition)), ANALYSIS_PATIENCE)
-        if response is None:
-            return False, "no answer of trim: is there an analysis node?"
-        if not response.success:
-            return False, response.message
-        point = response.trim
-        angles = [math.degrees(getattr(point.controls, name)) for name in CONTROL_NAMES]
-        rows = [
-            *zip(("collective", "lateral", "longitudinal", "differential"), angles, strict=True),
-            ("pitch", math.degrees(point.pitch)),
-            ("roll", math.degrees(point.roll)),
-        ]
-        table = "\n".join(f"| {name} | {round(value, 3) + 0.0:.3f} | deg |" for name, value in rows)
-        return True, (
-            f"**Trim at {_words(condition)}**\n\n| | | |\n|---|--:|---|\n{table}\n| thrust | {point.thrust:.1f} | N |\n"
-            f"| power | {point.power:.0f} | W |\n{_paragraphs(point.beyond_limits)}{_validity(response.warnings)}"
-        )
+        return _trimmed(condition, response, "trim", lambda: response.trim)
 
-    def linearize(self, condition: TrimCondition) -> Answer:
-        """Linearize about a condition; the model comes by `linear_model`."""
+    def linearize(self, condition: TrimCondition) -> tuple[Trimmed | None, str]:
+        """Linearize about a condition: its trim; the model comes by `linear_model`."""
         response = self._call("linearize", Linearize.Request(**_condition(condition)), ANALYSIS_PATIENCE)
-        if response is None:
-            return False, "no answer of linearize: is there an analysis node?"
-        if not response.success:
-            return False, response.message
-        return True, f"Linear model at {_words(condition)}: see *Modes*\n{_validity(response.warnings)}"
+        return _trimmed(condition, response, "linearize", lambda: response.model.trim)
 
 
-def _paragraphs(lines: Sequence[str]) -> str:
-    """Lines that come from a file or a message, as Markdown in which nothing of them is markup."""
-    return "".join(f"\n{MARKUP.sub(_entity, line)}\n" for line in lines)
-
-
-def _entity(mark: "re.Match[str]") -> str:
-    return f"&#{ord(mark[0])};"
-
-
-def _validity(warnings: Sequence[str]) -> str:
-    return _paragraphs([f"outside the model's validity: {line}" for line in warnings])
+def _trimmed(
+    condition: TrimCondition, response: Any, name: str, point_of: Callable[[], TrimPoint]
+) -> tuple[Trimmed | None, str]:
+    """Trim of an answer, or why there is none."""
+    if response is None:
+        return None, f"no answer of {name}: is there an analysis node?"
+    if not response.success:
+        return None, response.message
+    point = point_of()
+    controls = np.array([getattr(point.controls, name) for name in CONTROL_NAMES])
+    notes = (*point.beyond_limits, *(f"outside the model's validity: {text}" for text in response.warnings))
+    return Trimmed(condition, controls, point.pitch, point.roll, point.thrust, point.power, notes), ""
 
 
 def _condition(condition: TrimCondition) -> dict[str, float]:
     """Fields of a request."""
     return {name: float(value) for name, value in dataclasses.asdict(condition).items()}
-
-
-def _words(condition: TrimCondition) -> str:
-    parts = [f"{condition.airspeed:g} m/s"]
-    for value, unit, name in (
-        (condition.climb_rate, "m/s", "climb"),
-        (math.degrees(condition.sideslip), "deg", "sideslip"),
-        (math.degrees(condition.turn_rate), "deg/s", "turn"),
-    ):
-        if value:
-            parts.append(f"{name} {value:.3g} {unit}")
-    return ", ".join(parts)

@@ -2,12 +2,14 @@
 
 import contextlib
 import dataclasses
+import gzip
 import http.client
 import io
 import itertools
 import json
 import math
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -34,18 +36,20 @@ from sbs_msgs.msg import BodyState, FlightEvent, LinearModel, Mode, SimulationSt
 from sbs_sim import Aircraft, linearize, simulate, trim
 from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.cockpit import geometry
-from sbs_sim.cockpit.charts import PERIOD, History, body_charts, rotor_charts
+from sbs_sim.cockpit.charts import PERIOD, WINDOW, History, axis_range, body_charts, rotor_charts
 from sbs_sim.cockpit.gate import refusal
-from sbs_sim.cockpit.panels import KEYS, FlyPanel
+from sbs_sim.cockpit.panels import DOUBLET_LENGTH, DOUBLET_OF, DOUBLET_SIZE, KEYS, LIGHT_TURBULENCE, FlyPanel
 from sbs_sim.cockpit.playback import Recording, recordings
 from sbs_sim.cockpit.poles import NEAR, Pole, pole_figure, pole_page
 from sbs_sim.cockpit.readouts import Status, condition_here, readout, source_line
-from sbs_sim.cockpit.scene import COLOURS, colour_of
+from sbs_sim.cockpit.scene import COLOURS, Scene, Shown, colour_of
 from sbs_sim.cockpit.told import Trimmed, condition_words, model_page, trim_page, unsteady
+from sbs_sim.cockpit.viewpoint import CAMERAS, Viewpoint
 from sbs_sim.errors import RecordingError, SimulationError
 from sbs_sim.model import state as S
-from sbs_sim.model.frames import euler_to_quaternion
+from sbs_sim.model.frames import euler_to_quaternion, quaternion_to_euler
 from sbs_sim.model.multiblade import blade_matrix
+from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.cockpit_node import serve
 from sbs_sim.nodes.conversions import StateMessages, snapshot_of
 from sbs_sim.nodes.host import LATCHED_QOS
@@ -57,6 +61,7 @@ HOVER_STEP = ROOT / "bags" / "hover_step.mcap"
 AIRCRAFT = Aircraft.load("sbs")
 ROTORS = pytest.mark.parametrize("rotor", AIRCRAFT.rotors, ids=lambda rotor: rotor.name)
 ANGLES = st.floats(-0.3, 0.3)
+SERVED = []  # the server behind `served`
 
 
 def snapshot_of_flight(airspeed=10.0, wind=(0.0, 0.0, 0.0), heading=0.0, **condition):
@@ -68,6 +73,13 @@ def snapshot_of_flight(airspeed=10.0, wind=(0.0, 0.0, 0.0), heading=0.0, **condi
 
 def craft(name):
     return AIRCRAFT if name == "sbs" else Aircraft.load(ROOT / "test" / "data" / f"{name}.yaml")
+
+
+def scaled(aircraft, size):
+    """Aircraft that is so many times as large, of the same material."""
+    rotors = [dataclasses.replace(rotor, hub=size * rotor.hub, radius=size * rotor.radius) for rotor in aircraft.rotors]
+    body = dataclasses.replace(aircraft.body, mass=size**3 * aircraft.body.mass)
+    return dataclasses.replace(aircraft, body=body, rotors=tuple(rotors))
 
 
 def tip(rotor, azimuth, flap=0.0, lag=0.0):
@@ -193,6 +205,40 @@ def test_the_history_keeps_instants_apart_and_begins_anew_after_a_jump_back():
     assert set(history.table()[:, 0]) == {0.2}
 
 
+@pytest.mark.parametrize("period", [0.01, 0.066, 0.5])
+def test_the_history_is_as_long_however_often_it_is_drawn(period):
+    snapshot, _ = snapshot_of_flight()
+    history = History(body_charts(AIRCRAFT))
+    for k in range(int(50.0 / period)):
+        history.add(dataclasses.replace(snapshot, time=period * k))
+    times = history.table()[:, 0]
+    assert WINDOW - PERIOD - period <= times[-1] - times[0] <= WINDOW
+    assert history.beginning == 0.0
+
+
+@given(low=st.floats(-1e6, 1e6), span=st.floats(0.0, 1e6), least=st.sampled_from([1e-3, 0.1, 0.5, 1.0, 50.0]))
+def test_an_axis_has_numbers_at_both_ends_and_holds_the_curves(low, span, least):
+    high = low + span
+    bottom, top = axis_range(low, high, least)
+    unseen = 1e-8 * (top - bottom)
+    assert bottom <= low + unseen
+    assert high <= top + unseen
+    assert least <= (top - bottom) * (1 + 1e-9)
+    # the page numbers every step of 1, 2 or 5 times a power of ten for which there is room: those of the ends are there
+    step = min(
+        (top - bottom) / count for count in (1, 2, 3) if re.fullmatch(r"[125]\.0+e.*", f"{(top - bottom) / count:.6e}")
+    )
+    for end in (bottom, top):
+        assert end / step == pytest.approx(round(end / step), abs=1e-6)
+
+
+def test_rounding_does_not_fill_an_axis():
+    bottom, top = axis_range(1e5, 1e5 * (1 + 1e-12), 1.0)
+    assert 100.0 <= top - bottom <= 300.0
+    assert axis_range(-1.9, 1.9, 1.0) == (-2.0, 2.0)
+    assert axis_range(0.0, 4.2, 1.0) == (0.0, 6.0)
+
+
 def test_a_reset_of_a_paused_flight_is_seen():
     snapshot, _ = snapshot_of_flight()
     history = History(body_charts(AIRCRAFT))
@@ -268,6 +314,52 @@ def test_a_hover_is_at_no_airspeed_less_than_nothing():
     state = snapshot.state.copy()
     state[S.VELOCITY : S.RATES] = -1e-9
     assert "-0" not in condition_words(condition_here(dataclasses.replace(snapshot, state=state)))
+
+
+# --- the first minute -------------------------------------------------------------------------------------------
+
+
+def pitch_of(flight):
+    """Pitch over the time of a flight [deg]."""
+    attitude = np.stack([flight[name] for name in ("qw", "qx", "qy", "qz")], axis=1)
+    return np.degrees([quaternion_to_euler(quaternion)[1] for quaternion in attitude])
+
+
+def first(flight, happened):
+    """Time at which something has happened [s]; infinite if it has not."""
+    return float(flight["time"][np.argmax(happened)]) if happened.any() else math.inf
+
+
+def test_hands_off_in_still_air_a_hover_stays_and_a_cruise_does_not():
+    """README and the guide. How long it stays goes with the logarithm of rounding, 0.38 1/s: 67 s here."""
+    hover = trim(AIRCRAFT)
+    flight = simulate(AIRCRAFT, hover, hover.controls, duration=45.0)
+    away = np.linalg.norm([flight[name] for name in ("north", "east", "down")], axis=0)
+    assert away.max() < 0.01
+    cruise = trim(AIRCRAFT, airspeed=15.0)
+    flight = simulate(AIRCRAFT, cruise, cruise.controls, duration=4.0)
+    away = np.linalg.norm([flight["north"] - 15.0 * flight["time"], flight["east"], flight["down"]], axis=0)
+    assert first(flight, away > 0.01) < 3.0
+
+
+def test_a_doublet_shows_within_seconds_that_the_hover_is_unstable():
+    hover = trim(AIRCRAFT)
+
+    def controls(time):
+        change = np.sign(DOUBLET_LENGTH - time) if time < 2 * DOUBLET_LENGTH else 0.0
+        return hover.controls + change * DOUBLET_SIZE * np.eye(4)[DOUBLET_OF]
+
+    flight = simulate(AIRCRAFT, hover, controls, duration=6.5)
+    pitch = pitch_of(flight)
+    assert -4.0 < pitch[flight["time"] < 1.0].min() < -2.0
+    assert 5.0 < first(flight, abs(pitch) > 10.0) < 6.0
+
+
+def test_light_turbulence_shows_it_too():
+    hover = trim(AIRCRAFT)
+    wind = Wind(turbulence_intensity=(LIGHT_TURBULENCE,) * 3, turbulence_seed=1)
+    flight = simulate(AIRCRAFT, hover, hover.controls, duration=8.0, wind=wind)
+    assert 2.0 < first(flight, abs(pitch_of(flight)) > 10.0) < 8.0
 
 
 # --- messages and logs ------------------------------------------------------------------------------------------
@@ -433,11 +525,12 @@ def test_a_wrong_parameter_of_the_simulator_ends_the_cockpit_with_its_line():
 @pytest.fixture(scope="module")
 def served():
     """Address of a page that is served on this machine."""
-    server = serve("127.0.0.1", free_port())
+    made = serve("127.0.0.1", free_port())
+    SERVED[:] = [made]
     try:
-        yield f"127.0.0.1:{server.get_port()}"
+        yield f"127.0.0.1:{made.get_port()}"
     finally:
-        server.stop()
+        made.stop()
 
 
 def greeted(place, **headers):
@@ -463,6 +556,86 @@ def test_pages_of_others_cannot_fly(served, origin):
 def test_the_page_itself_and_programs_can(served):
     assert greeted(served, Origin=f"http://{served}") == 101
     assert greeted(served) == 101  # no browser: those always tell
+
+
+def test_the_page_has_a_title_and_an_icon_of_its_own(served):
+    for encoding in ("identity", "gzip"):
+        connection = http.client.HTTPConnection(served, timeout=PATIENCE)
+        connection.request("GET", "/", headers={"Accept-Encoding": encoding})
+        answer = connection.getresponse()
+        body = answer.read()
+        assert int(answer.headers["Content-Length"]) == len(body)
+        page = (gzip.decompress(body) if encoding == "gzip" else body).decode()
+        assert page.count("<title>") == page.count("<title>sbs_sim cockpit</title>") == 1
+        assert page.count('rel="icon"') == 1
+        assert "viser" not in page[: page.index("</title>")].lower().replace("viser client", "")
+
+
+@pytest.fixture
+def server(served):
+    """The server of that page."""
+    shown = SERVED[0]
+    yield shown
+    shown.scene.reset()
+
+
+@pytest.mark.parametrize("name", ["sbs", "tail_rotor", "tandem"])
+@pytest.mark.parametrize("size", [0.1, 1.0, 7.0])
+def test_any_aircraft_fills_the_picture_and_its_arrows_go_with_it(server, name, size):
+    """Seven times the helicopter has rotors of 3.6 m."""
+    aircraft = scaled(craft(name), size)
+    scene, viewpoint = Scene(server, aircraft, Shown()), Viewpoint(server)
+    viewpoint.use(scene.scale)
+    distance = np.linalg.norm(server.initial_camera.position)
+    assert 1.5 < distance / geometry.size(aircraft) < 3.0  # in all the view is 75 deg high
+    thrust = aircraft.body.mass * aircraft.environment.gravity / len(aircraft.rotors)
+    assert 0.2 < thrust / scene.newtons_per_metre / geometry.size(aircraft) < 0.6
+    assert 0.5 <= scene.cell / geometry.size(aircraft) * 3.0 <= 20.0
+    viewpoint.use(1.0)
+
+
+def test_who_looks_keeps_the_view_of_an_aircraft_of_another_size(server):
+    viewpoint = Viewpoint(server)
+    viewpoint.use(4.0)
+    assert np.linalg.norm(server.initial_camera.position) == pytest.approx(4.0 * np.linalg.norm(CAMERAS["behind"]))
+    viewpoint.use(1.0)
+
+
+@pytest.mark.parametrize(
+    ("ground", "shown", "told"),
+    [
+        (None, (True, False), ["height of the origin: lines 1 m and 10 m apart"]),
+        (0.0, (False, True), ["ground, at the origin's height: lines 1 m and 10 m apart"]),
+        (
+            -100.0,
+            (True, True),
+            [
+                "height of the origin: lines 1 m and 10 m apart",
+                "ground, 100 m below the origin: lines 10 m and 100 m apart",
+            ],
+        ),
+    ],
+)
+def test_the_ground_is_drawn_where_it_is(server, ground, shown, told):
+    scene = Scene(server, AIRCRAFT, Shown())
+    scene.set_ground(ground)
+    level, plane = (server.scene.get_handle_by_name(f"/ned/earth/{name}") for name in ("level", "ground"))
+    assert (level.visible, plane.visible) == shown
+    assert plane.plane_opacity == 1.0
+    assert level.plane_opacity == 0.0  # one sees, and flies, through it
+    if ground is not None:
+        assert plane.position[2] == -ground
+    assert scene.lines == told
+
+
+def test_the_plumb_line_ends_at_the_ground(server):
+    snapshot, _ = snapshot_of_flight()  # 25 m above the origin
+    scene = Scene(server, AIRCRAFT, Shown())
+    line = server.scene.get_handle_by_name("/ned/height")
+    for ground, length in ((None, 25.0), (-100.0, 125.0), (10.0, 15.0)):
+        scene.set_ground(ground)
+        scene.draw(snapshot)
+        np.testing.assert_allclose(line.points[0], [[0.0, 0.0, 0.0], [0.0, 0.0, length]])
 
 
 @pytest.mark.parametrize(
@@ -568,7 +741,7 @@ def test_keys_of_the_page_do_what_they_say_on_any_aircraft(file):
     model = linearize(aircraft)
     server, pilot = serve("127.0.0.1", free_port()), Commanded()
     try:
-        panel = FlyPanel(server, pilot, lambda: None)
+        panel = FlyPanel(server, pilot, lambda: None, lambda: None)
         panel.use(aircraft, model.control_effects)
         promised = {"Y": ("w", -1), "H": ("w", 1), "L": ("p", 1), "J": ("p", -1)}
         promised |= {"I": ("q", -1), "K": ("q", 1), "U": ("r", -1), "O": ("r", 1)}
@@ -637,6 +810,113 @@ def test_keys_fly(flying, page):
     made.client.next("events", lambda event: event.kind == FlightEvent.RESET)
 
 
+def pick(page, label, option):
+    page.get_by_label(label).click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
+CLICKS = {
+    "a tab": lambda page: page.get_by_role("tab", name="Rotors").click(),
+    "another tab": lambda page: page.get_by_role("tab", name="Body").click(),
+    "a button": lambda page: button(page, "Reset").click(),
+    "a list": lambda page: pick(page, "Real time", "0.5"),
+    "the list again": lambda page: pick(page, "Real time", "1"),
+    "a box": lambda page: page.get_by_label("Hold").click(),
+    "the box again": lambda page: page.get_by_label("Hold").click(),
+}
+
+
+def test_space_pauses_and_goes_on_whatever_was_clicked_last(flying, page):
+    made, _, _ = flying
+    state = made.client.next("status").state
+    for what, click in CLICKS.items():
+        click(page)
+        page.wait_for_timeout(100)
+        page.keyboard.press("Space")
+        state = SimulationStatus.PLAYING + SimulationStatus.PAUSED - state
+        made.client.until(lambda state=state: made.client.messages["status"][-1].state == state, f"space after {what}")
+    if state == SimulationStatus.PLAYING:
+        page.keyboard.press("Space")
+    made.client.next("status", lambda status: status.state == SimulationStatus.PAUSED)
+
+
+def test_keys_typed_into_a_box_are_its_own_until_return(flying, page):
+    made, _, _ = flying
+    collective = page.get_by_role("slider").first
+    box = collective.locator("xpath=following::input[not(@type='hidden')][1]")
+    box.fill("8.6")
+    box.press("Space")
+    made.client.spin(0.3)
+    assert made.client.next("status").state == SimulationStatus.PAUSED
+    box.press("Enter")
+    page.keyboard.press("Space")
+    made.client.next("status", lambda status: status.state == SimulationStatus.PLAYING)
+    button(page, "Reset").click()
+    made.client.next("events", lambda event: event.kind == FlightEvent.RESET)
+
+
+def test_a_doublet_goes_there_and_back_and_the_controls_are_as_before(flying, page):
+    made, _, _ = flying
+    seen = len(made.client.messages["events"])
+    pick(page, "Real time", "0.25")  # a busy machine reads states late
+    if button(page, "Play").count():
+        button(page, "Play").click()
+    button(page, "Doublet").click()
+
+    def moves():
+        """Longitudinal cyclic where it arrives [deg], and when [s], one after the other."""
+        found = []
+        for event in made.client.messages["events"][seen:]:
+            if event.kind == FlightEvent.SWASHPLATE:
+                cyclic = math.degrees(AIRCRAFT.unmix(np.reshape(event.swashplate, (2, 3)))[2])
+                level = round(2 * cyclic) / 2
+                if abs(cyclic - level) < 0.01 and (not found or found[-1][0] != level):
+                    found.append((level, event.header.stamp.sec + 1e-9 * event.header.stamp.nanosec))
+        return found
+
+    made.client.until(lambda: [level for level, _ in moves()][-3:] == [0.5, -0.5, 0.0], "the doublet")
+    times = [time for _, time in moves()[-3:]]
+    np.testing.assert_allclose(np.diff(times), 0.25, atol=0.1)
+    pick(page, "Real time", "1")
+    made.client.next("state", lambda state: abs(state.angular_velocity.y) > math.radians(1.0))
+    button(page, "Reset").click()
+    made.client.next("events", lambda event: event.kind == FlightEvent.RESET)
+
+
+def test_a_button_makes_the_air_turbulent_and_calm_again(flying, page):
+    made, _, _ = flying
+    for name, intensity in (("Turbulence", 0.3), ("Calm", 0.0)):
+        button(page, name).click()
+        wind = made.client.next("events", lambda event: event.kind == FlightEvent.WIND).wind
+        assert wind.turbulence_intensity.x == wind.turbulence_intensity.z == pytest.approx(intensity)
+    button(page, "Turbulence").wait_for(timeout=1e3 * PATIENCE)
+
+
+def test_charts_cover_twenty_seconds(page):
+    page.get_by_text("over simulation time").first.wait_for(timeout=1e3 * PATIENCE)
+    spans = page.evaluate(
+        "Object.values(window.__viserTestpoints.uplots).map(({chart: {scales: {x}}}) => x.max - x.min)"
+    )
+    assert len(spans) >= len(body_charts(AIRCRAFT))  # those of tabs that were seen
+    np.testing.assert_allclose(spans, 20.0, atol=1e-3)
+
+
+def test_on_a_phone_the_picture_is_above_the_panel(page):
+    before = page.viewport_size
+    page.set_viewport_size({"width": 390, "height": 844})
+    sheet = page.locator('div[style*="max-height: 60%"]')
+    sheet.wait_for(timeout=1e3 * PATIENCE)
+    page.wait_for_timeout(500)
+    picture, panel = page.locator("canvas[data-engine]").bounding_box(), sheet.bounding_box()
+    assert picture["height"] > 250
+    assert picture["y"] + picture["height"] <= panel["y"] + 1
+    assert (panel["x"], panel["width"]) == (0, 390)
+    assert sheet.locator(".mantine-ScrollArea-viewport").evaluate("(part) => part.scrollWidth") <= 390
+    assert button(page, "Doublet").is_visible()
+    page.set_viewport_size(before)
+    page.get_by_role("tab", name="Modes").wait_for(timeout=1e3 * PATIENCE)
+
+
 def test_a_button_ends_the_log_and_begins_another(flying, page):
     made, _, _ = flying
     first = made.client.next("status", lambda status: status.log).log
@@ -674,6 +954,32 @@ def test_a_log_is_replayed_in_the_same_view(page):
     choose(page, "hover_step.mcap", "hover_step.mcap paused")  # at its end after four seconds
     times = page.get_by_role("row", name="time").first.inner_text().split()
     assert float(times[1]) == pytest.approx(Recording(HOVER_STEP).end, abs=0.02)
+
+
+def test_in_the_view_of_a_log_keys_move_the_log_and_not_the_hidden_flight(flying, page):
+    made, _, _ = flying
+    before, state = len(made.client.messages["events"]), made.client.next("status").state
+    page.keyboard.press("y")
+    page.get_by_text("Not flown").wait_for(timeout=1e3 * PATIENCE)
+    page.keyboard.press("b")
+    page.keyboard.press("Space")  # from the beginning, for it is at its end
+    page.get_by_text("hover_step.mcap playing").wait_for(timeout=1e3 * PATIENCE)
+    page.keyboard.press("Shift+R")
+    page.keyboard.press("n")
+    page.get_by_text("hover_step.mcap paused").wait_for(timeout=1e3 * PATIENCE)
+    page.get_by_role("tab", name="Fly").click()
+    page.get_by_text("nothing here steers the live flight").wait_for(timeout=1e3 * PATIENCE)
+    assert page.get_by_role("slider").count() == 0
+    made.client.spin(0.5)
+    assert len(made.client.messages["events"]) == before
+    assert made.client.next("status").state == state
+
+    button(page, "Show the live flight").click()
+    page.get_by_text("LIVE", exact=True).first.wait_for(timeout=1e3 * PATIENCE)
+    page.keyboard.press("y")
+    made.client.next("events", lambda event: event.kind == FlightEvent.SWASHPLATE)
+    page.get_by_role("tab", name="Logs").click()
+    choose(page, "hover_step.mcap", "hover_step.mcap paused")
 
 
 def test_a_log_that_is_none_is_refused_and_the_view_stays(flying, page):

@@ -78,7 +78,7 @@ def test_the_cockpit_has_no_panel_of_markdown():
 
 def test_what_goes_onto_the_page_as_html_is_made_in_places_that_escape():
     """A name that comes from a file has no way around: f-strings of HTML are in these modules alone."""
-    allowed = {"charts", "poles", "readouts", "told", "view", "page"}
+    allowed = {"charts", "dress", "poles", "readouts", "told", "view"}
     for path in (PACKAGE / "cockpit").glob("*.py"):
         tree = ast.parse(path.read_text())
         made = [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) and "</" in ast.unparse(node)]

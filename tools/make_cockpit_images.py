@@ -1,6 +1,6 @@
 """Makes the pictures of the cockpit in docs/images: `./run python tools/make_cockpit_images.py`.
 
-A flight at 8 m/s with a step of each control, recorded, then linearized; taken at two sizes. The browser is that of the
+A flight at 5 m/s, linearized, recorded, and disturbed by a doublet; taken at two sizes. The browser is that of the
 tests, see test/browser.py.
 """
 
@@ -19,8 +19,8 @@ COCKPIT = ROOT / "install" / "sbs_sim" / "lib" / "sbs_sim" / "cockpit"
 IMAGES = ROOT / "docs" / "images"
 PORT = 8197
 SIZES = {"cockpit": (1280, 800), "cockpit_1920": (1920, 1080)}
-PACE = "0.25"  # time to take a picture before a helicopter that nobody holds has left
-NUDGES = ("y", "y", "l", "l", "j", "j", "h", "h", "i", "k")
+PACE = "0.5"  # time to draw without a graphics card
+BEFORE, AFTER = 4000, 9000  # ms until the doublet, and from then to the picture
 
 
 def main() -> None:
@@ -46,7 +46,7 @@ def main() -> None:
 def _take(page: object, path: Path, modes: bool) -> None:
     """Fly for some seconds, and take the picture, with the modes if wanted."""
     page.get_by_text("Reset to a trimmed flight").click()
-    page.get_by_label("Airspeed [m/s]").fill("8")
+    page.get_by_label("Airspeed [m/s]").fill("5")
     page.get_by_label("Airspeed [m/s]").press("Enter")
     page.get_by_text("Reset to a trimmed flight").click()
     page.get_by_label("Real time ×").click()
@@ -56,12 +56,12 @@ def _take(page: object, path: Path, modes: bool) -> None:
     page.get_by_role("button", name="Linearize here").click()
     page.get_by_text("Linear model at").first.wait_for()
     page.keyboard.press("Space")
-    for key in NUDGES:
-        page.wait_for_timeout(600)
-        page.keyboard.press(key)
+    page.wait_for_timeout(BEFORE)
+    page.get_by_role("button", name="Doublet").click()
+    page.mouse.move(640, 100)
     if modes:
         page.get_by_role("tab", name="Modes").click()
-    page.wait_for_timeout(1000)
+    page.wait_for_timeout(AFTER)
     page.screenshot(path=path)
     page.keyboard.press("Space")
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from viser import ViserServer, uplot
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.cockpit.told import line
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
@@ -20,10 +21,13 @@ from sbs_sim.simulation import Snapshot
 Array = NDArray[np.float64]
 
 WINDOW = 20.0  # s of simulation time that the charts show
+UNSEEN = 1e-6  # s
 PERIOD = 0.04  # s of simulation time between two instants that are kept
 AXIS = "#5c6670"
 FONT = "10px sans-serif"
 HEIGHT = 100  # pixels of a chart
+STEPS = (1.0, 2.0, 5.0, 10.0)  # of marks on a vertical axis, times a power of ten
+MOST_STEPS = 3  # between the ends of a vertical axis: so many have room for their numbers
 LEAST_SPAN = 1e-3  # that a vertical axis covers, over the largest value: rounding is no signal
 DEGREES = 180.0 / math.pi
 
@@ -114,16 +118,23 @@ class History:
 
     def __init__(self, charts: Sequence[Chart]) -> None:
         self._charts = charts
-        self._rows: collections.deque[list[float]] = collections.deque(maxlen=math.ceil(WINDOW / PERIOD) + 1)
+        self._rows: collections.deque[list[float]] = collections.deque()
         self._newest: list[float] = []
+        self.beginning = 0.0  # time of the first instant, which may be kept no more [s]
 
     def add(self, snapshot: Snapshot) -> None:
         """Take an instant, to be kept if it is far enough from the last one; one before that begins anew."""
         if self._rows and snapshot.time < self._rows[-1][0]:
             self._rows.clear()
         self._newest = [snapshot.time, *(value for chart in self._charts for value in chart.values(snapshot))]
+        if not self._rows:
+            self.beginning = snapshot.time
+        elif snapshot.time == self._rows[-1][0]:
+            self._rows[-1] = self._newest  # a reset of a paused flight
         if not self._rows or snapshot.time >= self._rows[-1][0] + 0.999 * PERIOD:
             self._rows.append(self._newest)
+        while self._rows[0][0] < snapshot.time - WINDOW:
+            self._rows.popleft()
 
     def clear(self) -> None:
         """Forget all."""
@@ -144,12 +155,16 @@ class ChartColumn:
     ----------
     server : ViserServer
     charts : sequence of Chart
+    heading : str
+        What stands above them.
     """
 
-    def __init__(self, server: ViserServer, charts: Sequence[Chart]) -> None:
+    def __init__(self, server: ViserServer, charts: Sequence[Chart], heading: str = "") -> None:
         self._charts = charts
         self.history = History(charts)
+        self._heading = server.gui.add_html(line(heading, "font-size:11px;padding:2px 8px"))
         self._captions, self._plots = [], []
+        self._updates = 0
         for chart in charts:
             self._captions.append(server.gui.add_html(_caption(chart, None)))
             self._plots.append(_plot(server, chart))
@@ -159,28 +174,46 @@ class ChartColumn:
         table = self.history.table()
         if not len(table):
             return
-        time = table[:, 0].copy()
+        left = max(self.history.beginning, float(table[-1, 0]) - WINDOW)
+        # A row more at both ends, in which no curve goes on: the axis covers as much time at any time. In a tab that
+        # was hidden the page makes its axis anew only where the ends change: they do, by nothing that could be seen.
+        self._updates += 1
+        time = np.array([left, *table[:, 0], left + WINDOW + UNSEEN * (self._updates % 2)])
         column = 1
         for chart, caption, plot in zip(self._charts, self._captions, self._plots, strict=True):
             curves = table[:, column : column + len(chart.names)]
             column += len(chart.names)
             caption.content = _caption(chart, curves[-1])
             # nothing but the data is changed: other properties make the page build its charts anew
-            limits = np.full(len(time), _range(curves, chart)[0])
-            limits[-1] = _range(curves, chart)[1]
-            plot.data = (time, *(curve.copy() for curve in curves.T), limits)
+            low, high = axis_range(float(curves.min()), float(curves.max()), chart.least)
+            limits = np.full(len(time), low)
+            limits[-1] = high
+            plot.data = (time, *(np.array([curve[0], *curve, math.nan]) for curve in curves.T), limits)
 
     def remove(self) -> None:
         """Take the charts off the page."""
-        for handle in (*self._captions, *self._plots):
+        for handle in (self._heading, *self._captions, *self._plots):
             handle.remove()
 
 
-def _range(curves: Array, chart: Chart) -> tuple[float, float]:
-    """Limits of the vertical axis; rounding does not fill it."""
-    low, high = float(curves.min()), float(curves.max())
-    margin = max(0.06 * (high - low), 0.5 * (chart.least - (high - low)), LEAST_SPAN * max(abs(low), abs(high)))
-    return low - margin, high + margin
+def axis_range(low: float, high: float, least: float) -> tuple[float, float]:
+    """Limits of a vertical axis at marks, of which at least two are numbered; rounding does not fill it.
+
+    Parameters
+    ----------
+    low, high : float
+        Of the values.
+    least : float
+        What it covers at least.
+    """
+    margin = max(0.0, 0.5 * (least - (high - low)), 0.5 * (LEAST_SPAN * max(abs(low), abs(high)) - (high - low)))
+    low, high = low - margin, high + margin
+    power = 10.0 ** math.floor(math.log10((high - low) / MOST_STEPS))
+    for step in (power * factor for factor in (*STEPS, 20.0)):
+        first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+        if last - first <= MOST_STEPS:
+            break
+    return first * step, last * step
 
 
 def _caption(chart: Chart, values: Array | None) -> str:
@@ -204,11 +237,11 @@ def _plot(server: ViserServer, chart: Chart) -> Any:
         series.append({"label": name, "stroke": COLOURS[i % len(COLOURS)], "width": 1.2, "points": {"show": False}})
     # what nobody sees holds the vertical axis to the limits that it is given
     series.append({"label": "limits", "width": 0.0, "stroke": "transparent", "points": {"show": False}})
-    nothing = np.array([0.0])
+    nothing = np.array([0.0, math.nan])  # not first: the page would take it for the least value
     return server.gui.add_uplot(
-        tuple(nothing for _ in series),
+        (np.array([0.0, WINDOW]), *(nothing for _ in chart.names), np.array([0.0, chart.least])),
         tuple(series),
-        scales={"x": {"time": False}, "y": {}},
+        scales={"x": {"time": False}, "y": {"range": {"min": {"pad": 0.0}, "max": {"pad": 0.0}}}},
         axes=({**axis, "size": 22.0, "space": 60.0}, {**axis, "size": 46.0, "space": 22.0}),
         legend={"show": False},
         cursor={"show": False},

@@ -17,6 +17,7 @@ import websockets.asyncio.server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
+from sbs_sim.cockpit.dress import dressed
 from sbs_sim.errors import SbsError
 
 
@@ -71,6 +72,7 @@ def guarded(host: str) -> Iterator[None]:
             response: Response | None = process_request(connection, request)
             if response is not None:  # a page of others must not frame this one to have it clicked on
                 response.headers["Content-Security-Policy"] = "frame-ancestors 'self'"
+                response = dressed(response)
             return response
 
         made.append(True)

@@ -1,7 +1,7 @@
 """The controls of the page: sliders, buttons, keys. What they do is done by a `Pilot`."""
 
-import itertools
 import math
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,7 +14,6 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
 from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.cockpit.readouts import condition_here
-from sbs_sim.cockpit.scene import Shown
 from sbs_sim.cockpit.told import Trimmed, line, model_page, trim_page
 from sbs_sim.errors import SbsError
 from sbs_sim.model.state import CONTROL_NAMES
@@ -24,7 +23,9 @@ Array = NDArray[np.float64]
 Answer = tuple[bool, str]  # whether it was done, and what is to be said
 
 SLIDER_STEP, KEY_STEP = 0.02, 0.1  # deg
-LARGEST_MAGNIFICATION = 20.0
+PLACE_STEP = 0.01  # s
+OLD_STATUS = 0.5  # s in which a status may still be one from before an answer
+NOTICE = 8.0  # s that a notice is shown
 PACES = ("0.01", "0.05", "0.1", "0.25", "0.5", "1", "2", "as fast as possible")
 LABELS = ("Collective", "Lateral", "Longitudinal", "Differential")
 # Two keys of each stick, with what they do to any aircraft; they lie together, apart from those that move the camera.
@@ -39,6 +40,17 @@ LIVE, NOTHING = "live", "choose a log"
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
 RECORD, END_RECORD = "Record", "End recording"
 TRIM, LINEARIZE = "Trim here", "Linearize here"
+DOUBLET, TURBULENCE, CALM = "Doublet", "Turbulence", "Calm"
+# What moves a trimmed flight within seconds, and leaves some to look: longitudinal cyclic, and gusts of a light wind.
+DOUBLET_OF, DOUBLET_SIZE, DOUBLET_LENGTH = 2, math.radians(0.5), 0.25  # index, rad, s of simulation time each way
+LIGHT_TURBULENCE = 0.3  # m/s
+FIRST_HINT = (
+    f"Space flies and pauses. In still air a trimmed flight may stay where it is for a minute: {DOUBLET} (B) or"
+    f" {TURBULENCE} moves it."
+)
+LOG_SHOWN = "A log is shown: nothing here steers the live flight meanwhile."
+GONE = "The simulator is gone."
+FLIES_ALONE = "Keys of the controls fly a live flight, not a log."
 
 
 class Pilot(Protocol):
@@ -46,6 +58,9 @@ class Pilot(Protocol):
 
     def command(self, controls: Array | None) -> None:
         """Hold pilot controls [rad], shape (4,), from now on; None lets go of them."""
+
+    def doublet(self, rest: Array, change: Array, length: float) -> None:
+        """Hold controls + change [rad], shape (4,), for a simulation time [s], then - change, then what was held."""
 
     def pause(self, paused: bool) -> Answer:
         """Pause or go on."""
@@ -85,7 +100,7 @@ def _by_user(act: Callable[[], None]) -> Callable[[Any], None]:
 def _notify(server: ViserServer, title: str, text: str) -> None:
     """Tell everyone who looks at the page what was refused."""
     for client in server.get_clients().values():
-        client.add_notification(title, text, color="orange", auto_close_seconds=8.0)
+        client.add_notification(title, text, color="orange", auto_close_seconds=NOTICE)
 
 
 class FlyPanel:
@@ -97,35 +112,64 @@ class FlyPanel:
     pilot : Pilot
     here : callable
         The flight right now, None before there is one.
+    back : callable
+        Shows it in place of a log.
     """
 
-    def __init__(self, server: ViserServer, pilot: Pilot, here: Callable[[], Snapshot | None]) -> None:
+    def __init__(
+        self, server: ViserServer, pilot: Pilot, here: Callable[[], Snapshot | None], back: Callable[[], None]
+    ) -> None:
         self._server, self._pilot, self._here = server, pilot, here
         self._paused = False
+        self._answered = -math.inf  # when a pause was answered [s]
         self._recording = False
         self._holding = False
+        self._steerable = True
+        self._turbulent = False
         self._aircraft: Aircraft | None = None
         self._ranges = np.tile((-1.0, 1.0), (len(CONTROL_NAMES), 1))  # deg, until there is an aircraft
         self._senses = np.ones(len(CONTROL_NAMES))  # of the controls, in what their keys are to do
-        self._add_clock()
+        self._words = [UNKNOWN] * len(CONTROL_NAMES)
+        self._note = server.gui.add_html("", visible=False)
+        self._back = server.gui.add_button("Show the live flight", visible=False)
+        self._back.on_click(lambda _: back())
+        self._all = server.gui.add_folder(None)
+        with self._all:
+            self._add_clock()
+            self._add_disturbances()
+            self._controls = server.gui.add_folder("Controls [deg]")
+            self._add_analysis()
+            self._add_reset()
+            self._add_wind()
         self._add_controls()
-        self._add_reset()
-        self._add_analysis()
-        self._add_wind()
-        self._add_keys()
 
-    def use(self, aircraft: Aircraft, effects: Sequence[ControlEffect]) -> None:
-        """Fly an aircraft from now on, whose controls have these effects; none of them if they are not known."""
+    def use(self, aircraft: Aircraft, effects: Sequence[ControlEffect], pace: float = 1.0) -> None:
+        """Fly an aircraft from now on.
+
+        Parameters
+        ----------
+        aircraft : Aircraft
+        effects : sequence of ControlEffect
+            Of its controls; none of them if they are not known.
+        pace : float
+            Real-time factor as it is.
+        """
         self._aircraft = aircraft
+        self._senses = np.array([effect.sense for effect in effects] or [1.0] * len(CONTROL_NAMES))
+        self._words = [f"more of it, in hover: {effect.words}" for effect in effects] or [UNKNOWN] * len(CONTROL_NAMES)
         self._ranges = np.degrees([aircraft.control_ranges[name] for name in CONTROL_NAMES])
         self._release()
-        for slider, (low, high) in zip(self.sliders, self._ranges.tolist(), strict=True):
-            slider.min, slider.max = low, high
-            slider.value = float(np.clip(slider.value, low, high))
-        self._senses = np.array([effect.sense for effect in effects] or [1.0] * len(CONTROL_NAMES))
-        said = [f"more of it, in hover: {effect.words}" for effect in effects] or [UNKNOWN] * len(CONTROL_NAMES)
-        for slider, words, ((less, _), (more, _)) in zip(self.sliders, said, KEYS, strict=True):
-            slider.hint = f"{words}. Keys {less}, {more}"
+        for handle in (*self.sliders, self._hold):
+            handle.remove()
+        self._add_controls()
+        self._show_pace(pace)
+
+    def steer(self, note: str) -> None:
+        """Let the flight be steered if there is nothing to note; else say that instead."""
+        if self._steerable != (not note) or (note and self._note.content != line(note)):
+            self._steerable = not note
+            self._note.content, self._note.visible, self._all.visible = line(note), bool(note), not note
+            self._back.visible = note == LOG_SHOWN
 
     # ------------------------------------------------------------------------------------------------------- parts
 
@@ -135,16 +179,31 @@ class FlyPanel:
         self._clock.on_click(lambda event: self._on_clock(event.target.value))
         self._pace = gui.add_dropdown("Real time ×", PACES, initial_value="1")
         self._pace.on_update(_by_user(self._on_pace))
-        self._record = gui.add_button(RECORD, hint="begins a log of the flight as it is now, or ends the present one")
-        self._record.on_click(lambda _: self._say("Recording", self._pilot.record(not self._recording)))
+
+    def _add_disturbances(self) -> None:
+        gui = self._server.gui
+        self._hint = gui.add_html(line(FIRST_HINT))
+        self._disturb = gui.add_button_group(
+            "Disturb",
+            (DOUBLET, TURBULENCE),
+            hint=f"longitudinal cyclic {math.degrees(DOUBLET_SIZE):g} deg up and down, {2 * DOUBLET_LENGTH:g} s in all;"
+            f" Dryden turbulence of {LIGHT_TURBULENCE:g} m/s",
+        )
+        self._disturb.on_click(lambda event: self._on_disturb(event.target.value))
 
     def _add_controls(self) -> None:
         gui = self._server.gui
-        with gui.add_folder("Controls [deg]"):
+        with self._controls:
             self.sliders = []
             for i, label in enumerate(LABELS):
-                low, high = self._ranges[i]
-                slider = gui.add_slider(label, low, high, SLIDER_STEP, float(np.clip(0.0, low, high)))
+                low, high = (float(end) for end in self._ranges[i])
+                marks = tuple(
+                    (value, f"{value:g}") for value in sorted({low, high} | ({0.0} if low < 0.0 < high else set()))
+                )
+                start = float(np.clip(0.0, low, high))
+                (less, _), (more, _) = KEYS[i]
+                hint = f"{self._words[i]}. Keys {less}, {more}"
+                slider = gui.add_slider(label, low, high, SLIDER_STEP, start, hint=hint, marks=marks)
                 slider.on_update(_by_user(self._on_slider))
                 self.sliders.append(slider)
             self._hold = gui.add_checkbox("Hold", False, hint="the page keeps commanding; untick to let others fly")
@@ -174,14 +233,8 @@ class FlyPanel:
             ]
             self._turbulence = gui.add_number("Turbulence, σ [m/s]", 0.0, min=0.0, max=20.0, step=0.1)
             gui.add_button("Set wind").on_click(lambda _: self._on_wind())
-
-    def _add_keys(self) -> None:
-        add = self._server.gui.add_command
-        add("Pause or go on", hotkey="space").on_trigger(lambda _: self._on_clock(PAUSE))
-        add("Step", hotkey="N").on_trigger(lambda _: self._on_clock(STEP))
-        add("Reset", hotkey="R", modifier="shift").on_trigger(lambda _: self._on_clock(RESET))
-        for key, name in itertools.chain.from_iterable(KEYS):
-            add(name, hotkey=key).on_trigger(lambda _, key=key: self.press(key))
+        self._record = gui.add_button(RECORD, hint="begins a log of the flight as it is now, or ends the present one")
+        self._record.on_click(lambda _: self._on_record())
 
     # ----------------------------------------------------------------------------------------------------- actions
 
@@ -191,25 +244,92 @@ class FlyPanel:
         if not done:
             _notify(self._server, f"{what} refused", message)
 
-    def _on_clock(self, button: str) -> None:
-        if button in (PLAY, PAUSE):
-            self._say(button, self._pilot.pause(not self._paused))
-        elif button == STEP:
-            self._say(button, self._pilot.step(1))
-        elif button == RESET:
+    def go(self) -> None:
+        """Pause or go on."""
+        if self._steerable:
+            wanted = not self._paused
+            answer = self._pilot.pause(wanted)
+            self._say(PAUSE if wanted else PLAY, answer)
+            if answer[0]:  # the next key may come before the next status
+                self._answered = time.monotonic()
+                self._show_clock(not wanted)
+
+    def step(self) -> None:
+        """Fly a tick."""
+        if self._steerable:
+            self._say(STEP, self._pilot.step(1))
+
+    def restart(self) -> None:
+        """Put the aircraft into the trimmed flight that the page has."""
+        if self._steerable:
             self._release()
-            self._say(button, self._pilot.reset(self._condition(), self._height.value))
+            self._try(RESET, lambda: self._pilot.reset(self._condition(), self._height.value))
+
+    def press(self, key: str) -> None:
+        """Move the control of a key a step, the way that the key says whatever the sign of this aircraft's control."""
+        if not self._steerable:
+            return
+        for slider, sense, bounds, ((less, _), (more, _)) in zip(
+            self.sliders, self._senses, self._ranges, KEYS, strict=True
+        ):
+            if key in (less, more):
+                change = KEY_STEP * sense * (1.0 if key == more else -1.0)
+                slider.value = float(np.clip(slider.value + change, *bounds))
+                self._on_slider()
+
+    def doublet(self) -> None:
+        """Move the longitudinal cyclic to and fro."""
+        if self._steerable and self._aircraft is not None and (snapshot := self._here()) is not None:
+            self._hint.visible = False
+            held = np.radians([slider.value for slider in self.sliders])
+            rest = held if self._holding else self._aircraft.unmix(snapshot.swashplate)
+            push = DOUBLET_SIZE * self._senses[DOUBLET_OF] * np.eye(len(CONTROL_NAMES))[DOUBLET_OF]
+            self._pilot.doublet(rest, push, DOUBLET_LENGTH)
+
+    def _try(self, what: str, ask: Callable[[], Answer]) -> None:
+        """Ask for what may be refused before it is sent."""
+        try:
+            answer = ask()
+        except SbsError as error:
+            answer = (False, str(error))
+        self._say(what, answer)
+
+    def _on_clock(self, button: str) -> None:
+        act = {PLAY: self.go, PAUSE: self.go, STEP: self.step, RESET: self.restart}.get(button)
+        if act is not None:  # what is no page of ours may send anything
+            act()
+
+    def _on_disturb(self, button: str) -> None:
+        if button == DOUBLET:
+            self.doublet()
+        elif button in (TURBULENCE, CALM) and self._steerable:
+            self._hint.visible = False
+            self._turbulence.value = LIGHT_TURBULENCE if button == TURBULENCE else 0.0
+            self._on_wind()
+
+    def _on_record(self) -> None:
+        if self._steerable:
+            self._say("Recording", self._pilot.record(not self._recording))
 
     def _condition(self) -> TrimCondition:
         sideslip, turn = math.radians(self._sideslip.value), math.radians(self._turn.value)
         return TrimCondition(self._airspeed.value, self._climb.value, sideslip, turn)
 
+    def _show_pace(self, pace: float) -> None:
+        """Choose the real-time factor that is in force; one that the page does not offer joins the others."""
+        name = PACES[-1] if pace == 0.0 else f"{pace:g}"
+        self._pace.options = PACES if name in PACES else (name, *PACES)
+        self._pace.value = name
+
     def _on_pace(self) -> None:
-        if self._pace.value in PACES:
+        if self._pace.value in self._pace.options and self._steerable:
             factor = 0.0 if self._pace.value == PACES[-1] else float(self._pace.value)
             self._say("Real-time factor", self._pilot.set_pace(factor))
 
     def _on_slider(self) -> None:
+        if not self._steerable:
+            return
+        self._hint.visible = False
         values = np.array([slider.value for slider in self.sliders])
         if not np.isfinite(values).all():  # what is no page of ours may send anything
             self._say("Controls", (False, f"{values.tolist()} deg: allowed are finite numbers"))
@@ -228,16 +348,6 @@ class FlyPanel:
         self._holding = False
         self._hold.value = False
         self._pilot.command(None)
-
-    def press(self, key: str) -> None:
-        """Move the control of a key a step, the way that the key says whatever the sign of this aircraft's control."""
-        for slider, sense, bounds, ((less, _), (more, _)) in zip(
-            self.sliders, self._senses, self._ranges, KEYS, strict=True
-        ):
-            if key in (less, more):
-                change = KEY_STEP * sense * (1.0 if key == more else -1.0)
-                slider.value = float(np.clip(slider.value + change, *bounds))
-                self._on_slider()
 
     def _on_analysis(self, button: str) -> None:
         snapshot, aircraft = self._here(), self._aircraft
@@ -258,18 +368,31 @@ class FlyPanel:
 
     def _on_wind(self) -> None:
         velocity = np.array([number.value for number in self._wind])
-        self._say("Wind", self._pilot.set_wind(velocity, self._turbulence.value))
+        if self._steerable:
+            self._try("Wind", lambda: self._pilot.set_wind(velocity, self._turbulence.value))
 
     # ------------------------------------------------------------------------------------------------------ update
+
+    def show_wind(self, velocity: Array, turbulence: float) -> None:
+        """The wind that somebody has set: steady, NED [m/s], shape (3,), and the largest part of its turbulence."""
+        for number, value in zip(self._wind, velocity, strict=True):
+            number.value = round(float(value), 3)
+        self._turbulence.value = round(turbulence, 3)
+        if self._turbulent != (turbulence > 0.0):
+            self._turbulent = turbulence > 0.0
+            self._disturb.options = (DOUBLET, CALM if self._turbulent else TURBULENCE)
+
+    def _show_clock(self, playing: bool) -> None:
+        self._paused = not playing
+        self._clock.options = (PAUSE if playing else PLAY, STEP, RESET)
 
     def update(self, swashplate: Array, playing: bool, recording: bool) -> None:
         """Follow the flight: the swashplate angles that are in force [rad], unless this page commands the controls."""
         if self._recording != recording:
             self._recording = recording
             self._record.label = END_RECORD if recording else RECORD
-        if self._paused == playing:
-            self._paused = not playing
-            self._clock.options = (PAUSE if playing else PLAY, STEP, RESET)
+        if self._paused == playing and time.monotonic() - self._answered > OLD_STATUS:
+            self._show_clock(playing)
         if self._holding or self._aircraft is None:
             return
         controls = self._aircraft.unmix(swashplate)
@@ -304,13 +427,15 @@ class LogPanel:
         self._pick = gui.add_dropdown("Source", [self._first, *self._names()])
         self._pick.on_update(_by_user(self._on_pick))
         gui.add_button("Look for new logs").on_click(lambda _: self._refresh())
+        self._times = np.zeros(1)
         self.playing = gui.add_checkbox("Play", True)
         self.rate = gui.add_dropdown("Speed ×", PACES[:-1], initial_value="1")
-        self.place = gui.add_slider("Time [s]", 0.0, 1.0, 0.01, 0.0)
+        self.place = gui.add_slider("Time [s]", 0.0, 1.0, PLACE_STEP, 0.0)
+        self._told = -math.inf
         self.moved = False
         self.place.on_update(_by_user(self._on_place))
         self.message = gui.add_html("")
-        self.enable(False)
+        self.enable(None)
 
     def _names(self) -> list[str]:
         self._paths = {path.name: path for path in self._list()}
@@ -344,58 +469,48 @@ class LogPanel:
         """Recorded time over wall time; 1 for what is none of those to choose from."""
         return float(self.rate.value) if self.rate.value in PACES[:-1] else 1.0
 
-    def enable(self, there: bool, beginning: float = 0.0, end: float = 1.0) -> None:
-        """Offer the controls of a log from a beginning to an end [s]."""
+    def enable(self, times: Array | None) -> None:
+        """Offer the controls of a log with instants [s], or of none."""
         for handle in (self.playing, self.rate, self.place):
-            handle.disabled = not there
-        if there:
-            self.place.min, self.place.max = beginning, max(end, beginning + 0.01)
+            handle.disabled = times is None
+        if times is not None:
+            self._times = times
+            self.place.min, self.place.max = float(times[0]), max(float(times[-1]), float(times[0]) + 0.01)
+            self.playing.value = True
 
+    def _move(self, place: float) -> None:
+        """Go to a time [s]."""
+        self.place.value = place
+        self.moved = True
 
-class ViewPanel:
-    """What is shown, how large, from where.
+    def go(self) -> None:
+        """Pause or go on; from the beginning where the end is reached."""
+        at_end = self.place.value >= self._times[-1] - PLACE_STEP
+        if at_end:
+            self._move(float(self._times[0]))
+        self.playing.value = at_end or not self.playing.value
 
-    Parameters
-    ----------
-    server : ViserServer
-    shown : Shown
-        Changed in place.
-    """
+    def step(self) -> None:
+        """Go to the next instant."""
+        self.playing.value = False
+        after = self._times[self._times > self.place.value + 0.5 * PLACE_STEP]
+        self._move(float(after[0]) if len(after) else float(self._times[-1]))
 
-    def __init__(self, server: ViserServer, shown: Shown) -> None:
-        gui = server.gui
-        magnification = gui.add_slider(
-            "Flap, lag ×",
-            1.0,
-            LARGEST_MAGNIFICATION,
-            0.5,
-            shown.magnification,
-            hint="flap and lag angles are drawn that much larger",
-        )
-        magnification.on_update(lambda _: _magnify(shown, magnification.value))
-        for field, label in (
-            ("ducts", "Ducts"),
-            ("paths", "Tip paths"),
-            ("arrows", "Thrust and hub moments"),
-            ("inflow", "Inflow"),
-            ("trail", "Trail"),
-        ):
-            box = gui.add_checkbox(label, getattr(shown, field))
-            box.on_update(lambda _, field=field, box=box: setattr(shown, field, box.value))
-        cameras = gui.add_button_group("From", tuple(CAMERAS))
-        cameras.on_click(lambda event: place_camera(event.client, CAMERAS[event.target.value]))
+    def restart(self) -> None:
+        """Go to the beginning."""
+        self._move(float(self._times[0]))
 
+    def press(self, key: str) -> None:
+        """Nothing: a log is flown."""
+        self._say_once(FLIES_ALONE)
 
-def _magnify(shown: Shown, value: float) -> None:
-    if 1.0 <= value <= LARGEST_MAGNIFICATION:  # false for a NaN as well
-        shown.magnification = value
+    def doublet(self) -> None:
+        """Nothing: a log is flown."""
+        self._say_once(FLIES_ALONE)
 
-
-CAMERAS = {"behind": (-2.0, 1.2, 1.0), "left": (0.0, 2.6, 0.3), "above": (-0.01, 0.0, 3.0), "front": (2.2, 0.7, 0.6)}
-
-
-def place_camera(client: Any, position: tuple[float, float, float]) -> None:
-    """Look at the aircraft from a place, in the viewer's axes [m]: north, west, up."""
-    if client is not None:
-        client.camera.position = position
-        client.camera.look_at = (0.0, 0.0, 0.0)
+    def _say_once(self, text: str) -> None:
+        """Notify, but not at every key."""
+        now = time.monotonic()
+        if now - self._told > NOTICE:
+            self._told = now
+            _notify(self._server, "Not flown", text)

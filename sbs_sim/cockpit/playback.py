@@ -1,6 +1,7 @@
 """A recorded flight as snapshots over time."""
 
 import bisect
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -29,6 +30,8 @@ class Recording:
         The one that was flown.
     times : ndarray, shape (n,)
         Of the recorded states [s].
+    ground : float or None
+        Height of the ground above the origin [m]; None if the log does not tell.
     complete : bool
         False if the file is not whole: then there is what is.
 
@@ -46,7 +49,8 @@ class Recording:
         self.path, self.aircraft, self.complete = path, flight.aircraft, log.complete
         self._flight = flight
         self._step_size = float(log.metadata["simulation"]["step_size"])
-        self.times = flight.steps * self._step_size
+        self.times: Array = np.asarray(flight.steps * self._step_size, dtype=np.float64)
+        self.ground = _finite(log.metadata["simulation"].get("ground_altitude", ""))
         self._azimuths, self._loads = _rotors(log, len(self.aircraft.rotors))
         places = np.searchsorted(log["rotors"].time, self.times - 0.5 * self._step_size)
         self._places = np.minimum(places, len(self._loads) - 1)
@@ -83,6 +87,15 @@ class Recording:
             if (found := value(event)) is not None:
                 return found
         raise RecordingError(f"{self.path}: the log lacks the start of its flight")
+
+
+def _finite(text: str) -> float | None:
+    """A number of a text, None if it is none or not finite."""
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
 
 
 def _rotors(log: Log, rotors: int) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from sbs_sim.simulation import Snapshot
 
 SKY, EARTH, MARK = "#8fbbe0", "#b59a78", "#20262c"
 PIXELS_PER_DEGREE = 2.0
+MANY = 1e4  # N or W
 SLOW = 0.5  # m/s: below, the track says nothing
 FLOW_DIGITS, ANGLE_DIGITS = 2, 3  # m/s and rad: what a condition "here" is rounded to
 
@@ -86,11 +87,12 @@ def readout(aircraft: Aircraft, snapshot: Snapshot, status: Status, source: str)
         ("climb", _fixed(-ground[2]), "m/s"),
         ("height", _fixed(-state[S.POSITION + 2]), "m"),
         ("heading", f"{round(math.degrees(yaw), 1) % 360:.1f}", "deg"),
-        ("thrust", f"{snapshot.loads[:, P.THRUST].sum():.1f}", "N"),
-        ("power", f"{power:.0f}", "W"),
+        ("thrust", *_scaled(float(snapshot.loads[:, P.THRUST].sum()), "N", 1)),
+        ("power", *_scaled(power, "W", 0)),
     )
     cells = "".join(
-        f'<tr><td style="color:#5c6670">{name}</td><td style="text-align:right;padding-left:8px">{value}</td>'
+        f'<tr style="white-space:nowrap"><td style="color:#5c6670">{name}</td>'
+        f'<td style="text-align:right;padding-left:8px">{value}</td>'
         f'<td style="padding-left:4px;color:#5c6670">{unit}</td></tr>'
         for name, value, unit in rows
     )
@@ -125,6 +127,11 @@ def source_line(log: str, flying: bool) -> str:
 def _fixed(value: float) -> str:
     """Number with two decimals, without a minus before zeros."""
     return f"{round(float(value), 2) + 0.0:.2f}"
+
+
+def _scaled(value: float, unit: str, digits: int) -> tuple[str, str]:
+    """Number and unit, in thousands where there are many."""
+    return (f"{value:.{digits}f}", unit) if abs(value) < MANY else (f"{value / 1000.0:.1f}", f"k{unit}")
 
 
 def _horizon(pitch: float, roll: float) -> str:

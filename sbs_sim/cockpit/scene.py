@@ -1,7 +1,8 @@
 """The aircraft in three dimensions: what a `Snapshot` says, as nodes of a viser scene.
 
 The scene is carried by the aircraft: the c.g. stays at the origin and the earth moves, so that the view follows a
-flight while the camera belongs to the user. `/ned` turns NED axes into those of the viewer, whose z is up.
+flight while the camera belongs to the user. `/ned` turns NED axes into those of the viewer, whose z is up. Lengths of
+what is no part of an aircraft, arrows and cells of grids, go with its size.
 """
 
 import collections
@@ -31,13 +32,16 @@ FUSELAGE, DUCT, BLADE, FIRST_BLADE = (92, 104, 118), (150, 160, 170), (52, 60, 7
 THRUST, MOMENT, PATH, TRAIL = (0, 114, 178), (204, 121, 167), (0, 158, 115), (90, 100, 110)
 AMBIENT, SUN = 1.9, 1.6  # of light; together they show the colours of what faces up as they are
 TO_SUN = (-2.0, -1.0, -4.0)  # NED
+REFERENCE_SIZE = 1.15  # m from the c.g. to the furthest tip: of the aircraft that the lengths below are for
 FOG = (60.0, 400.0)  # m
 GRID_SIZE = 2000.0  # m
+LEVEL_FADE = 60.0  # m, at which the grid at the origin's height has faded
+THIN = 0.02  # m: planes that are nearer to each other than this are one
 RINGS, SECTORS, PATH_POINTS = 4, 24, 60
 TRAIL_PERIOD, TRAIL_POINTS = 0.25, 240  # s of simulation time between points
 RESET_DISTANCE, RESET_SPEED = 0.5, 100.0  # m and m/s: what is further or faster is no flight but a reset
 ARROW_OF_WEIGHT = 0.5  # m, arrow of a rotor that carries its share of the weight
-ARROW_OF_MOMENT = 0.06  # m / (N m)
+ARROW_OF_MOMENT = 6.0  # m, arrow of a moment of that share at 1 m
 LEAST_ARROW = 1e-3  # m
 # Viridis (Smith and van der Walt) at nine places: lightness grows evenly, and all people see it alike.
 COLOURS = np.array(
@@ -87,21 +91,56 @@ class Scene:
 
     def __init__(self, server: ViserServer, aircraft: Aircraft, shown: Shown) -> None:
         self.aircraft, self._shown = aircraft, shown
+        self.scale = geometry.size(aircraft) / REFERENCE_SIZE
         self._scene = server.scene
         self._scene.add_frame("/ned", show_axes=False, wxyz=NED_TO_VIEW)
         self._earth = self._scene.add_frame("/ned/earth", show_axes=False)
         self._body = self._scene.add_frame("/ned/body", show_axes=False)
-        _add_ground(self._scene)
-        _add_fuselage(self._scene, aircraft)
-        share = aircraft.body.mass * aircraft.environment.gravity / len(aircraft.rotors)
+        _add_light(self._scene, self.scale)
+        self._level, self._ground_plane = _add_grids(self._scene, self.scale, self.cell)
+        self._ground: float | None = None
+        self.set_ground(None)
+        _add_fuselage(self._scene, aircraft, self.scale)
+        weight = aircraft.body.mass * aircraft.environment.gravity or 1.0  # N; there may be no gravity
+        share = weight / len(aircraft.rotors)
+        self.newtons_per_metre = share / (ARROW_OF_WEIGHT * self.scale)
+        self.moment_per_metre = share / ARROW_OF_MOMENT
         self._rotors = [
-            RotorNodes(self._scene, f"/ned/body/rotor{j}", rotor, ARROW_OF_WEIGHT / share)
-            for j, rotor in enumerate(aircraft.rotors)
+            RotorNodes(self._scene, f"/ned/body/rotor{j}", rotor, self) for j, rotor in enumerate(aircraft.rotors)
         ]
         self._trail = Trail(self._scene)
-        self.newtons_per_metre = share / ARROW_OF_WEIGHT
-        induced = math.sqrt(share / (2 * aircraft.environment.air_density * math.pi * aircraft.rotors[0].radius ** 2))
+        mass_flow = 2 * aircraft.environment.air_density * sum(math.pi * rotor.radius**2 for rotor in aircraft.rotors)
+        induced = math.sqrt(weight / mass_flow) if mass_flow else 1.0  # of hover by momentum theory [m/s]; or a vacuum
         self.inflow_range = (0.0, float(math.ceil(2 * induced)))
+
+    @property
+    def cell(self) -> float:
+        """Width of the grids' cells: a power of ten near the aircraft's size [m]."""
+        return float(10.0 ** math.floor(math.log10(self.scale) + 0.3))
+
+    @property
+    def lines(self) -> list[str]:
+        """What the lines of the grids are, in words."""
+
+        def apart(cell: float) -> str:
+            return f"lines {cell:g} m and {10.0 * cell:g} m apart"
+
+        told = [f"height of the origin: {apart(self.cell)}"] if self._level.visible else []
+        if self._ground is not None:
+            side = "below" if self._ground < 0.0 else "above"
+            where = f"{abs(self._ground):g} m {side} the origin" if self._level.visible else "at the origin's height"
+            told.append(f"ground, {where}: {apart(float(self._ground_plane.cell_size))}")
+        return told
+
+    def set_ground(self, altitude: float | None) -> None:
+        """Draw level ground at a height above the origin [m], or none; the grid at the origin's height stays."""
+        self._ground = altitude
+        self._ground_plane.visible = altitude is not None
+        self._level.visible = altitude is None or abs(altitude) > THIN * self.scale
+        if altitude is not None:
+            self._ground_plane.position = (0.0, 0.0, -altitude)
+            cell = self.cell if not self._level.visible else 10.0 * self.cell  # of what is seen from afar
+            self._ground_plane.cell_size, self._ground_plane.section_size = cell, 10.0 * cell
 
     def draw(self, snapshot: Snapshot, lead: float = 0.0) -> None:
         """Show an instant.
@@ -121,6 +160,7 @@ class Scene:
             nodes.draw_loads(snapshot.loads[j], self._shown)
             nodes.draw_inflow(state[layout.inflow(j)], self.inflow_range, self._shown)
         self._trail.draw(snapshot.time, state[S.POSITION : S.ATTITUDE], self._shown.trail)
+        self._trail.draw_height(-float(state[S.POSITION + 2]) - (self._ground or 0.0))
 
     def clear_trail(self) -> None:
         """Forget where the aircraft was."""
@@ -140,12 +180,12 @@ class RotorNodes:
     name : str
         Of the node that holds them.
     rotor : Rotor
-    metres_per_newton : float
-        Length of the thrust arrow.
+    whole : Scene
+        Which says how long arrows are.
     """
 
-    def __init__(self, scene: Any, name: str, rotor: Rotor, metres_per_newton: float) -> None:
-        self._rotor, self._metres_per_newton = rotor, metres_per_newton
+    def __init__(self, scene: Any, name: str, rotor: Rotor, whole: Scene) -> None:
+        self._rotor, self._whole = rotor, whole
         self._up = np.asarray(rotor.shaft_direction) / np.linalg.norm(rotor.shaft_direction)
         hub = SO3.from_matrix(hub_axes(rotor.shaft_direction)).wxyz
         self._duct = _add_duct(scene, f"{name}/duct", rotor, hub)
@@ -154,6 +194,7 @@ class RotorNodes:
             f"{name}/path", np.zeros((PATH_POINTS, 2, 3)), PATH, thickness=2.0, thickness_units="screen"
         )
         sizes = {"shaft_radius": 0.012, "head_radius": 0.032, "head_length": 0.07}
+        sizes = {part: whole.scale * length for part, length in sizes.items()}
         still = np.array([[rotor.hub, rotor.hub]])
         self._thrust = scene.add_arrows(f"{name}/thrust", still, THRUST, **sizes)
         self._moment = scene.add_arrows(f"{name}/moment", still, MOMENT, **sizes)
@@ -182,10 +223,10 @@ class RotorNodes:
     def draw_loads(self, loads: Array, shown: Shown) -> None:
         """Thrust along the shaft and moment on the hub."""
         for node, vector in (
-            (self._thrust, self._metres_per_newton * loads[P.THRUST] * self._up),
-            (self._moment, ARROW_OF_MOMENT * loads[P.MOMENT : P.MOMENT + 3]),
+            (self._thrust, loads[P.THRUST] / self._whole.newtons_per_metre * self._up),
+            (self._moment, loads[P.MOMENT : P.MOMENT + 3] / self._whole.moment_per_metre),
         ):
-            there = shown.arrows and float(np.linalg.norm(vector)) > LEAST_ARROW
+            there = shown.arrows and float(np.linalg.norm(vector)) > LEAST_ARROW * self._whole.scale
             _show(node, there)
             if there:
                 node.points = np.array([[self._rotor.hub, self._rotor.hub + vector]], dtype=np.float32)
@@ -233,7 +274,6 @@ class Trail:
             if time < since or math.dist(place, position) > RESET_DISTANCE + RESET_SPEED * (time - since):
                 self.clear()
         self._before = (time, position.copy())
-        self._height.points = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, -position[2]]]], dtype=np.float32)
         if time - self._last >= TRAIL_PERIOD:
             self._last = time
             self._points.append(position.copy())
@@ -241,6 +281,10 @@ class Trail:
             if len(points) > 1:
                 self._node.points = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
         _show(self._node, shown and len(self._points) > 1)
+
+    def draw_height(self, height: float) -> None:
+        """Draw a plumb line of a length [m]."""
+        self._height.points = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, height]]], dtype=np.float32)
 
 
 def colour_of(values: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
@@ -262,33 +306,41 @@ def _show(node: Any, wanted: bool) -> None:
         node.visible = wanted
 
 
-def _add_ground(scene: Any) -> None:
-    """Sky, horizon, ground and its grid: cells of 1 m, sections of 10 m."""
+def _add_light(scene: Any, scale: float) -> None:
+    """Sky, haze, light."""
     scene.set_background_image(np.full((2, 2, 3), SKY, dtype=np.uint8), format="png")
-    scene.configure_fog(*FOG, color=SKY)
+    scene.configure_fog(*(max(1.0, scale) * distance for distance in FOG), color=SKY)
     scene.configure_environment_map(None)  # its light would wash out the colours, which mean something here
     scene.configure_default_lights(False)
     scene.add_light_ambient("/ned/ambient", intensity=AMBIENT)
     scene.add_light_directional("/ned/sun", intensity=SUN, position=TO_SUN)
-    scene.add_grid(
-        "/ned/earth/grid",
-        GRID_SIZE,
-        GRID_SIZE,
-        cell_size=1.0,
-        section_size=10.0,
-        cell_color=GRID,
-        section_color=SECTION,
-        cell_thickness=0.6,
-        section_thickness=1.0,
-        fade_distance=FOG[1],
-        plane_color=GROUND,
-        plane_opacity=1.0,
-        shadow_opacity=0.0,
-        wxyz=NED_TO_VIEW,  # seen from above
-    )
 
 
-def _add_fuselage(scene: Any, aircraft: Aircraft) -> None:
+def _add_grids(scene: Any, scale: float, cell: float) -> tuple[Any, Any]:
+    """Lines at the origin's height, through which one sees, and the ground; cells, and sections of ten."""
+
+    def add(name: str, opacity: float, fade: float) -> Any:
+        return scene.add_grid(
+            name,
+            GRID_SIZE * max(1.0, scale),
+            GRID_SIZE * max(1.0, scale),
+            cell_size=cell,
+            section_size=10.0 * cell,
+            cell_color=GRID,
+            section_color=SECTION,
+            cell_thickness=0.6,
+            section_thickness=1.0,
+            fade_distance=fade * max(1.0, scale),
+            plane_color=GROUND,
+            plane_opacity=opacity,
+            shadow_opacity=0.0,
+            wxyz=NED_TO_VIEW,  # seen from above
+        )
+
+    return add("/ned/earth/level", 0.0, LEVEL_FADE), add("/ned/earth/ground", 1.0, FOG[1])
+
+
+def _add_fuselage(scene: Any, aircraft: Aircraft, scale: float) -> None:
     """A body that shows where the nose is, and beams to the hubs."""
     length = 0.4 * geometry.size(aircraft)
     place = "/ned/body/fuselage"
@@ -304,7 +356,9 @@ def _add_fuselage(scene: Any, aircraft: Aircraft) -> None:
     for j, rotor in enumerate(aircraft.rotors):
         distance = float(np.linalg.norm(rotor.hub))
         if distance > 0.0:
-            beam = trimesh.creation.cylinder(radius=0.018, segment=np.array([np.zeros(3), rotor.hub]), sections=12)
+            beam = trimesh.creation.cylinder(
+                radius=0.018 * scale, segment=np.array([np.zeros(3), rotor.hub]), sections=12
+            )
             scene.add_mesh_simple(
                 f"/ned/body/beam{j}", beam.vertices, beam.faces, color=FUSELAGE, cast_shadow=False, side="double"
             )

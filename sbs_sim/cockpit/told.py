@@ -105,20 +105,21 @@ def unsteady(trimmed: Trimmed, snapshot: Snapshot) -> list[str]:
         ]
     )
     apart = [
-        f"{name} {math.degrees(now):.1f} deg instead of {math.degrees(steady) + 0.0:.1f}"
+        f"{name} {_degrees(now, 1)} deg instead of {_degrees(steady, 1)}"
         for name, now, steady in (("pitch", pitch, trimmed.pitch), ("roll", roll, trimmed.roll))
         if not abs(math.remainder(now - steady, 2 * math.pi)) <= STEADY_ANGLE
     ]
     apart += [
-        f"{name} {math.degrees(now):.1f} deg/s instead of {math.degrees(steady) + 0.0:.1f}"
+        f"{name} {_degrees(now, 1)} deg/s instead of {_degrees(steady, 1)}"
         for name, now, steady in zip("pqr", snapshot.state[S.RATES : S.RATES + 3], rates, strict=True)
         if not abs(now - steady) <= STEADY_RATE
     ]
     return [f"The flight is not in this trim: {', '.join(apart)}."] if apart else []
 
 
-def _degrees(value: float) -> str:
-    return f"{round(math.degrees(value), 2) + 0.0:.2f}"
+def _degrees(value: float, digits: int = 2) -> str:
+    """An angle in degrees, without a minus before zeros."""
+    return f"{round(math.degrees(value), digits) + 0.0:.{digits}f}"
 
 
 def _row(name: str, trim: str, now: str, unit: str) -> str:

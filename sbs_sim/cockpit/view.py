@@ -5,19 +5,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
 from sbs_sim.cockpit.charts import ChartColumn, body_charts, rotor_charts
-from sbs_sim.cockpit.panels import CAMERAS, Answer, FlyPanel, LogPanel, Pilot, ViewPanel
+from sbs_sim.cockpit.keys import Keyed, add_keys
+from sbs_sim.cockpit.panels import GONE, LOG_SHOWN, Answer, FlyPanel, LogPanel, Pilot
 from sbs_sim.cockpit.playback import Recording, recordings
 from sbs_sim.cockpit.poles import Pole, pole_page
 from sbs_sim.cockpit.readouts import Status, readout, source_line
-from sbs_sim.cockpit.scene import ARROW_OF_MOMENT, COLOURS, MOMENT, PATH, THRUST, Scene, Shown
+from sbs_sim.cockpit.scene import COLOURS, MOMENT, PATH, THRUST, Scene, Shown
+from sbs_sim.cockpit.viewpoint import ViewPanel, Viewpoint
 from sbs_sim.errors import SbsError
 from sbs_sim.simulation import Snapshot
 
+Array = NDArray[np.float64]
+
+OVER_TIME = "over simulation time [s]"
 FRAME_PERIOD = 1.0 / 30.0  # s
 READOUT_EVERY, CHARTS_EVERY = 3, 6  # frames
 PANEL_WIDTH = 308  # pixels
@@ -28,6 +35,27 @@ NO_FLIGHT = (
     " comes in here by itself. <b>Logs</b> can be looked at meanwhile.</div>"
 )
 NO_MODEL = '<div style="font:12px sans-serif;padding:10px">No linear model yet: <b>Linearize here</b> makes one.</div>'
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What a simulator flies.
+
+    Attributes
+    ----------
+    aircraft : Aircraft
+    effects : sequence of ControlEffect
+        Of its controls; none of them if they are not known.
+    ground : float
+        Height of the ground above the origin [m].
+    pace : float
+        Real-time factor that is asked for; 0 is as fast as possible.
+    """
+
+    aircraft: Aircraft
+    effects: Sequence[ControlEffect]
+    ground: float
+    pace: float
 
 
 @dataclass(frozen=True)
@@ -65,7 +93,7 @@ class View:
 
     def __init__(self, server: ViserServer, pilot: Pilot, live: Callable[[], Live | None], folder: Path) -> None:
         self._server, self._pilot, self._live = server, pilot, live
-        self._aircraft: Aircraft | None = None  # of the live flight
+        self._flown: Flown | None = None  # live
         self._recording: Recording | None = None
         self._place = 0.0
         self._lock = threading.RLock()  # callbacks of the page come in threads of their own
@@ -73,11 +101,11 @@ class View:
         self._shown = Shown()
         self._scene: Scene | None = None
         self._columns: list[ChartColumn] = []
-        server.initial_camera.position = CAMERAS["behind"]
-        server.initial_camera.look_at = (0.0, 0.0, 0.0)
+        self._viewpoint = Viewpoint(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
         self._add_main_panel(folder)
         self._add_charts()
+        add_keys(server, self._front)
 
     def _add_main_panel(self, folder: Path) -> None:
         gui = self._server.gui
@@ -94,7 +122,7 @@ class View:
         with tabs.add_tab("Logs"):
             self._logs = LogPanel(self._server, lambda: recordings(folder), self.show)
         with tabs.add_tab("View"):
-            ViewPanel(self._server, self._shown)
+            ViewPanel(self._server, self._shown, self._viewpoint)
             self._legend = gui.add_html("")
 
     def _add_charts(self) -> None:
@@ -106,26 +134,32 @@ class View:
         panel.set_width(PANEL_WIDTH)
 
     def _make_columns(self, aircraft: Aircraft) -> list[ChartColumn]:
+        names = ", ".join(f"{j} {rotor.name}" for j, rotor in enumerate(aircraft.rotors, 1))
         columns = []
-        for tab, charts in zip(self._tabs, (body_charts(aircraft), rotor_charts(aircraft)), strict=True):
+        for tab, charts, heading in zip(
+            self._tabs,
+            (body_charts(aircraft), rotor_charts(aircraft)),
+            (OVER_TIME, f"{OVER_TIME}; rotors: {names}"),
+            strict=True,
+        ):
             with tab:
-                columns.append(ChartColumn(self._server, charts))
+                columns.append(ChartColumn(self._server, charts, heading))
         return columns
 
     # -------------------------------------------------------------------------------------------------- what to show
 
-    def fly(self, aircraft: Aircraft, effects: Sequence[ControlEffect]) -> None:
-        """Offer a live flight of an aircraft with what its controls do, and show it if no log is being shown."""
+    def fly(self, flown: Flown) -> None:
+        """Offer a live flight, and show it if no log is being shown."""
         with self._lock:
-            self._aircraft = aircraft
+            self._flown = flown
             if self._fly is None:
                 self._no_flight.remove()
                 with self._fly_tab:
-                    self._fly = FlyPanel(self._server, self._pilot, self._here)
-            self._fly.use(aircraft, effects)
+                    self._fly = FlyPanel(self._server, self._pilot, self._here, self._back)
+            self._fly.use(flown.aircraft, flown.effects, flown.pace)
             self._logs.offer_live(self._recording is None)
             if self._recording is None:
-                self._use(aircraft)
+                self._use(flown.aircraft, flown.ground)
 
     def show(self, path: Path | None) -> Answer:
         """Show a log from its beginning, or the live flight; a log that cannot be shown changes nothing."""
@@ -135,15 +169,30 @@ class View:
             return False, str(error)
         with self._lock:
             self._recording = recording
-            self._place = recording.beginning if recording else 0.0
-            if (aircraft := recording.aircraft if recording else self._aircraft) is not None:
-                self._use(aircraft)
             if recording is None:
-                self._logs.enable(False)
+                self._logs.enable(None)
+                if self._flown is not None:
+                    self._use(self._flown.aircraft, self._flown.ground)
                 return True, ""
-            self._logs.enable(True, recording.beginning, recording.end)
+            self._place = recording.beginning
+            self._use(recording.aircraft, recording.ground)
+            self._logs.enable(recording.times)
         whole = "" if recording.complete else ", not complete"
         return True, f"{recording.aircraft.name}, {recording.end - recording.beginning:.1f} s{whole}"
+
+    def _back(self) -> None:
+        """Show the live flight."""
+        self._logs.offer_live(True)
+        self.show(None)
+
+    def show_wind(self, velocity: Array, turbulence: float) -> None:
+        """Show what wind somebody has set."""
+        if self._fly is not None:
+            self._fly.show_wind(velocity, turbulence)
+
+    def _front(self) -> Keyed | None:
+        """What keys act on."""
+        return self._fly if self._recording is None else self._logs
 
     def show_model(self, poles: list[Pole], title: str) -> None:
         """Show the poles of a linear model."""
@@ -153,16 +202,18 @@ class View:
         live = self._live()
         return None if live is None else live.snapshot
 
-    def _use(self, aircraft: Aircraft) -> None:
+    def _use(self, aircraft: Aircraft, ground: float | None) -> None:
         """Draw an aircraft, from now on and without what was before."""
-        if self._scene is None or aircraft.parameter_hash != self._scene.aircraft.parameter_hash:
+        if self._scene is None or not _same(aircraft, self._scene.aircraft):
             if self._scene is not None:
                 self._scene.remove()
             self._scene = Scene(self._server, aircraft, self._shown)
-            self._legend.content = _legend(self._scene)
+            self._viewpoint.use(self._scene.scale)
             for column in self._columns:
                 column.remove()
             self._columns = self._make_columns(aircraft)
+        self._scene.set_ground(ground)
+        self._legend.content = _legend(self._scene)
         self._forget()
 
     def _forget(self) -> None:
@@ -188,6 +239,9 @@ class View:
             if self._frames % READOUT_EVERY == 0:
                 log = "" if self._recording is None else self._recording.path.name
                 self._source.content = source_line(log, live is not None and not live.gone)
+                if self._fly is not None:
+                    gone = live is None or live.gone
+                    self._fly.steer(LOG_SHOWN if self._recording is not None else GONE if gone else "")
             if shown is None or self._scene is None:
                 return
             if not self._server.get_clients():  # nobody looks: only the histories go on
@@ -226,13 +280,19 @@ class View:
         return Live(recording.at(self._place), 0.0, Status(playing, rate if playing else 0.0))
 
 
+def _same(one: Aircraft, other: Aircraft) -> bool:
+    """Alike, in their names too, which are no part of the hash."""
+    names = [[craft.name, *(rotor.name for rotor in craft.rotors)] for craft in (one, other)]
+    return one.parameter_hash == other.parameter_hash and names[0] == names[1]
+
+
 def _legend(scene: Scene) -> str:
-    """Scale of the inflow's colours and of the arrows."""
+    """Scale of the inflow's colours and of the arrows, and of what the ground shows."""
     low, high = scene.inflow_range
     stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in COLOURS)
     arrows = (
-        (THRUST, "thrust of a rotor", f"1 m is {scene.newtons_per_metre:.0f} N"),
-        (MOMENT, "moment on its hub", f"1 m is {1 / ARROW_OF_MOMENT:.0f} N m"),
+        (THRUST, "thrust of a rotor", f"1 m is {scene.newtons_per_metre:.3g} N"),
+        (MOMENT, "moment on its hub", f"1 m is {scene.moment_per_metre:.3g} N m"),
         (PATH, "tip path", "flap as magnified"),
     )
     lines = "".join(
@@ -242,7 +302,8 @@ def _legend(scene: Scene) -> str:
     )
     return (
         f'<div style="font:12px sans-serif;padding:8px 10px;line-height:1.5">{lines}'
-        '<div style="margin-top:6px">induced velocity down through the disc [m/s]</div>'
+        + "".join(f"<div>{text}</div>" for text in scene.lines)
+        + '<div style="margin-top:6px">induced velocity down through the disc [m/s]</div>'
         f'<div style="height:10px;margin:3px 0;background:linear-gradient(to right,{stops})"></div>'
         f'<div style="display:flex;justify-content:space-between"><span>{low:g}</span>'
         f"<span>{(low + high) / 2:g}</span><span>{high:g}</span></div></div>"

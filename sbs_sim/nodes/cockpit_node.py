@@ -4,6 +4,7 @@ Subscribes `state`, `rotors`, `inflow`, `events`, `status`, `linear_model`; publ
 `reset`, `set_wind`, `trim`, `linearize`, and sets the simulator's `real_time_factor`.
 """
 
+import contextlib
 import logging
 import math
 import os
@@ -29,10 +30,10 @@ from sbs_sim.cockpit.gate import guarded
 from sbs_sim.cockpit.poles import Pole
 from sbs_sim.cockpit.readouts import Status
 from sbs_sim.cockpit.told import condition_words
-from sbs_sim.cockpit.view import FRAME_PERIOD, Live, View
+from sbs_sim.cockpit.view import FRAME_PERIOD, Flown, Live, View
 from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.model.state import SWASHPLATE_NAMES
-from sbs_sim.nodes.conversions import snapshot_of
+from sbs_sim.nodes.conversions import snapshot_of, to_seconds
 from sbs_sim.nodes.host import COMPLAINT_PERIOD, EVENT_QOS, LATCHED_QOS, Component
 from sbs_sim.nodes.remote_pilot import RemotePilot
 
@@ -75,8 +76,8 @@ class Cockpit(Component):
         self._model: LinearModel | None = None
         self._pilot = RemotePilot(self)
         self._aircraft: Aircraft | None = None
-        # that another simulator has begun to fly, and what its controls do
-        self._found: tuple[Aircraft, tuple[ControlEffect, ...]] | None = None
+        self._found: Flown | None = None  # that another simulator has begun to fly
+        self._told_wind: tuple[Array, float] | None = None
         self.failed = False
         for name, kind in MESSAGES.items():
             self.create_subscription(kind, name, lambda data, name=name: self._keep(name, data), NEWEST, raw=True)
@@ -95,6 +96,9 @@ class Cockpit(Component):
         """Keep a message as it came: only those that are drawn are taken apart."""
         self._newest[name] = data
         self._arrived = time.monotonic()  # status comes while the flight is paused, too
+        if name == "state" and self._pilot.follows_time:
+            with contextlib.suppress(SbsError):  # told where it is drawn
+                self._pilot.tick(to_seconds(_message(data, BodyState).header.stamp))
 
     def _on_event(self, event: FlightEvent) -> None:
         angles, velocity = np.array(event.swashplate), event.wind.velocity
@@ -103,6 +107,9 @@ class Cockpit(Component):
         wind = np.array([velocity.x, velocity.y, velocity.z])
         if event.kind in (FlightEvent.START, FlightEvent.WIND) and np.isfinite(wind).all():
             self._wind = wind
+            part = event.wind.turbulence_intensity
+            turbulence = max(part.x, part.y, part.z)
+            self._told_wind = (wind, turbulence if math.isfinite(turbulence) else 0.0)
 
     def _on_model(self, model: LinearModel) -> None:
         self._model = model
@@ -162,11 +169,13 @@ class Cockpit(Component):
         while not self._end.wait(LOOK_PERIOD):
             if time.monotonic() - self._arrived > SILENCE:
                 known = False
-            elif not known and (name := self._pilot.aircraft()) is not None:
+            elif not known and (told := self._pilot.settings()) is not None:
                 known = True
                 try:
-                    aircraft = Aircraft.load(name)
-                    self._found = aircraft, self._effects(aircraft)
+                    aircraft = Aircraft.load(told["aircraft"])
+                    self._found = Flown(
+                        aircraft, self._effects(aircraft), told["ground_altitude"], told["real_time_factor"]
+                    )
                 except SbsError as error:
                     self.get_logger().error(f"the simulator's aircraft cannot be shown: {error}")
 
@@ -200,8 +209,12 @@ class Cockpit(Component):
     def _draw(self, view: View, elapsed: float) -> None:
         found, self._found = self._found, None
         if found is not None:
-            self._aircraft = found[0]
-            view.fly(*found)
+            self._aircraft = found.aircraft
+            view.fly(found)
+        wind = self._told_wind
+        if wind is not None and self._aircraft is not None:
+            self._told_wind = None
+            view.show_wind(*wind)
         model, self._model = self._model, None
         if model is not None:
             poles, title = _poles(model)

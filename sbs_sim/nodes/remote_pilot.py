@@ -26,6 +26,7 @@ Answer = tuple[bool, str]
 PATIENCE = 10.0  # s for an answer
 ANALYSIS_PATIENCE = 60.0  # s for a trim or a linear model
 COMMAND_PERIOD = 0.1  # s between commands that hold the controls
+SETTINGS = {"aircraft": str, "ground_altitude": float, "real_time_factor": float}
 SERVICES = {
     "pause": SetBool,
     "step": Step,
@@ -37,6 +38,18 @@ SERVICES = {
     "simulator/set_parameters": SetParameters,
     "simulator/get_parameters": GetParameters,
 }
+
+
+@dataclasses.dataclass
+class _Doublet:
+    """Controls for one length of time after the other, those for afterwards, and what was held before."""
+
+    controls: tuple[Array, Array]
+    rest: Array
+    length: float
+    before: Controls | None
+    begin: float | None = None
+    part: int = -1
 
 
 class RemotePilot:
@@ -54,6 +67,7 @@ class RemotePilot:
         }
         self._output = node.create_publisher(Controls, "controls", COMMAND_QOS)
         self._held: Controls | None = None
+        self._doublet: _Doublet | None = None
         node.create_timer(COMMAND_PERIOD, self._hold)
 
     def _call(self, name: str, request: Any, patience: float = PATIENCE) -> Any:
@@ -78,15 +92,48 @@ class RemotePilot:
         if self._held is not None:
             self._output.publish(self._held)
 
-    def aircraft(self) -> str | None:
-        """Aircraft of the simulator, a name or a path; None while it does not answer."""
-        response = self._call("simulator/get_parameters", GetParameters.Request(names=["aircraft"]))
-        return None if response is None or not response.values else parameter_value_to_python(response.values[0])
+    def settings(self) -> dict[str, Any] | None:
+        """Parameters of the simulator that the page shows, by name; None while it does not answer."""
+        response = self._call("simulator/get_parameters", GetParameters.Request(names=list(SETTINGS)))
+        if response is None or len(response.values) != len(SETTINGS):
+            return None
+        values = [parameter_value_to_python(value) for value in response.values]
+        known = all(isinstance(value, kind) for value, kind in zip(values, SETTINGS.values(), strict=True))
+        return dict(zip(SETTINGS, values, strict=True)) if known else None
 
     def command(self, controls: Array | None) -> None:
         """Hold pilot controls [rad], shape (4,), from now on; None lets go of them."""
+        self._doublet = None
         self._held = None if controls is None else controls_of(controls)
         self._hold()
+
+    def doublet(self, rest: Array, change: Array, length: float) -> None:
+        """Hold controls + change [rad], shape (4,), for a simulation time [s], then - change, then what was held."""
+        self._doublet = _Doublet((rest + change, rest - change), rest, length, self._held)
+
+    @property
+    def follows_time(self) -> bool:
+        """Simulation time is wanted by `tick`."""
+        return self._doublet is not None
+
+    def tick(self, now: float) -> None:
+        """Simulation time has come to this [s]."""
+        doublet = self._doublet
+        if doublet is None:
+            return
+        if doublet.begin is None or now < doublet.begin:
+            doublet.begin = now
+        part = int((now - doublet.begin) / doublet.length + 1e-6)
+        if part == doublet.part:
+            return
+        doublet.part = part
+        if part < len(doublet.controls):
+            self._held = controls_of(doublet.controls[part])
+            self._hold()
+        else:
+            self._doublet = None
+            self._output.publish(controls_of(doublet.rest))
+            self._held = doublet.before
 
     def pause(self, paused: bool) -> Answer:
         """Pause or go on."""

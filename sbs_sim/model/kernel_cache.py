@@ -29,8 +29,10 @@ def cache_folder() -> Path | None:
     if refusals or folder is None:
         kept = f"kept in {folder}" if folder else "compiled anew by every process, which takes up to a minute"
         why = "; ".join(refusals) or "no folder for them can be written"
-        remedy = "NUMBA_CACHE_DIR names a folder of your own that no other user may write into"
-        logging.getLogger(__name__).warning(f"sbs_sim: kernels are {kept}: {why}; remedy: {remedy}")
+        logging.getLogger(__name__).warning(
+            f"sbs_sim: kernels are {kept}: {why};"
+            " remedy: NUMBA_CACHE_DIR names a folder of your own that no other user may write into"
+        )
     return folder
 
 

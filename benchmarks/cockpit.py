@@ -38,7 +38,7 @@ import browser  # noqa: E402
 
 EXECUTABLES = ROOT / "install" / "sbs_sim" / "lib" / "sbs_sim"
 SETTLING = 3.0  # s before a measurement
-BLADES = "/ned/body/rotor0/blades"  # what every picture of a flight changes
+BLADES = "/ned1/body/rotor0/blades"  # what every picture of a flight changes
 COUNT_FRAMES = """seconds => new Promise(done => {
     const begin = performance.now(); let frames = 0;
     const next = () => performance.now() - begin < 1e3 * seconds

@@ -17,6 +17,7 @@ import time
 from pathlib import Path
 
 import browser
+import msgspec
 import numpy as np
 import pytest
 import viser
@@ -44,6 +45,7 @@ from sbs_sim.cockpit.poles import NEAR, Pole, pole_figure, pole_page
 from sbs_sim.cockpit.readouts import Status, condition_here, readout, source_line
 from sbs_sim.cockpit.scene import COLOURS, Scene, Shown, colour_of
 from sbs_sim.cockpit.told import Trimmed, condition_words, model_page, trim_page, unsteady
+from sbs_sim.cockpit.view import Flown, View
 from sbs_sim.cockpit.viewpoint import CAMERAS, Viewpoint
 from sbs_sim.errors import RecordingError, SimulationError
 from sbs_sim.model import state as S
@@ -594,11 +596,50 @@ def test_any_aircraft_fills_the_picture_and_its_arrows_go_with_it(server, name, 
     viewpoint.use(1.0)
 
 
-def test_who_looks_keeps_the_view_of_an_aircraft_of_another_size(server):
-    viewpoint = Viewpoint(server)
-    viewpoint.use(4.0)
-    assert np.linalg.norm(server.initial_camera.position) == pytest.approx(4.0 * np.linalg.norm(CAMERAS["behind"]))
-    viewpoint.use(1.0)
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (-2.0, 1.2, 1.0),
+    "look_at": (0.2, 0.0, 0.1),
+    "up_direction": (0.0, 0.0, 1.0),
+    "fov": 1.3,
+    "near": 0.01,
+    "far": 1e3,
+}
+
+
+@contextlib.contextmanager
+def looking(width, height):
+    """A viewpoint, and a client that looked from somewhere before there was one."""
+    server = serve("127.0.0.1", free_port())
+    options = {"subprotocols": [Subprotocol(f"viser-v{viser.__version__}")], "proxy": None}
+    try:
+        with connect(f"ws://127.0.0.1:{server.get_port()}", **options) as client:
+            client.send(msgspec.msgpack.encode({**CAMERA, "image_width": width, "image_height": height}))
+            end = time.monotonic() + PATIENCE
+            while not server.get_clients() and time.monotonic() < end:
+                time.sleep(0.01)
+            yield Viewpoint(server), next(iter(server.get_clients().values()))
+    finally:
+        server.stop()
+
+
+def test_who_looks_keeps_the_view_of_an_aircraft_of_another_size():
+    with looking(1280, 800) as (viewpoint, client):
+        position, look_at = client.camera.position.copy(), client.camera.look_at.copy()
+        viewpoint.use(4.0)
+        np.testing.assert_allclose(client.camera.position, 4.0 * position)
+        np.testing.assert_allclose(client.camera.look_at, 4.0 * look_at)
+        viewpoint.use(1.0)
+        np.testing.assert_allclose(client.camera.position, position)
+
+
+@pytest.mark.parametrize(("width", "factor"), [(1280, 1.0), (720, 1.0), (400, 1.8)])
+def test_a_narrow_picture_is_taken_from_further_away(width, factor):
+    with looking(width, 800) as (viewpoint, client):
+        viewpoint.place(client, "left")
+        np.testing.assert_allclose(client.camera.position, factor * np.array(CAMERAS["left"]), rtol=1e-6)
+        np.testing.assert_allclose(client.camera.look_at, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -626,6 +667,32 @@ def test_the_ground_is_drawn_where_it_is(server, ground, shown, told):
     if ground is not None:
         assert plane.position[2] == -ground
     assert scene.lines == told
+
+
+@pytest.mark.parametrize(("name", "ducts"), [("sbs", 2), ("tail_rotor", 0), ("tandem", 0)])
+def test_ducts_are_drawn_where_there_are_some(server, name, ducts):
+    def drawn(aircraft):
+        scene = Scene(server, aircraft, Shown())
+        names = [f"/ned/body/rotor{j}/duct" for j in range(len(aircraft.rotors))]
+        found = sum(server.scene.get_handle_by_name(one) is not None for one in names)
+        scene.remove()
+        return found
+
+    assert drawn(craft(name)) == ducts
+    assert drawn(craft(name).with_value("rotors.duct_expansion", 0.7)) == 2
+
+
+def test_an_aircraft_after_another_is_drawn_under_names_of_its_own(tmp_path):
+    """A node that is made again under its name keeps its pose in browsers: a hover was tilted like the log before."""
+    server = serve("127.0.0.1", free_port())
+    try:
+        view = View(server, Commanded(), lambda: None, tmp_path)
+        for i, name in enumerate(("sbs", "tandem", "sbs"), 1):
+            view.fly(Flown(craft(name), (), -100.0, 1.0))
+            roots = [j for j in range(5) if server.scene.get_handle_by_name(f"/ned{j}/body") is not None]
+            assert roots == [i]
+    finally:
+        server.stop()
 
 
 def test_the_plumb_line_ends_at_the_ground(server):

@@ -26,6 +26,7 @@ PERIOD = 0.04  # s of simulation time between two instants that are kept
 AXIS = "#5c6670"
 FONT = "10px sans-serif"
 HEIGHT = 100  # pixels of a chart
+HEAVY = 1e4  # N of weight, beyond which loads are in thousands
 STEPS = (1.0, 2.0, 5.0, 10.0)  # of marks on a vertical axis, times a power of ten
 MOST_STEPS = 3  # between the ends of a vertical axis: so many have room for their numbers
 LEAST_SPAN = 1e-3  # that a vertical axis covers, over the largest value: rounding is no signal
@@ -93,18 +94,21 @@ def rotor_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
     def coordinates(place: Callable[[int], slice], factor: float) -> Callable[[Snapshot], Sequence[float]]:
         return lambda snapshot: [float(factor * value) for j in rotors for value in snapshot.state[place(j)][:3]]
 
-    def load(column: int) -> Callable[[Snapshot], Sequence[float]]:
-        return lambda snapshot: [float(snapshot.loads[j, column]) for j in rotors]
+    heavy = aircraft.body.mass * aircraft.environment.gravity > HEAVY
+    factor, kilo = (1e-3, "k") if heavy else (1.0, "")
+
+    def thrust(snapshot: Snapshot) -> list[float]:
+        return [factor * float(snapshot.loads[j, P.THRUST]) for j in rotors]
 
     def power(snapshot: Snapshot) -> list[float]:
-        return [float(snapshot.loads[j, P.TORQUE]) * aircraft.rotors[j].speed for j in rotors]
+        return [factor * float(snapshot.loads[j, P.TORQUE]) * aircraft.rotors[j].speed for j in rotors]
 
     return (
         Chart("Flap", "deg", names("a0", "a1", "b1"), coordinates(layout.flap, DEGREES), 2, 0.1),
         Chart("Lag", "deg", names("ξ0", "ξc", "ξs"), coordinates(layout.lag, DEGREES), 2, 0.1),
         Chart("Inflow, over tip speed", "1", names("λ0", "λs", "λc"), coordinates(layout.inflow, 1.0), 4, 1e-3),
-        Chart("Thrust", "N", names("T"), load(P.THRUST), 1, 5.0),
-        Chart("Power", "W", names("P"), power, 0, 50.0),
+        Chart("Thrust", f"{kilo}N", names("T"), thrust, 3 if heavy else 1, factor * 5.0),
+        Chart("Power", f"{kilo}W", names("P"), power, 1 if heavy else 0, factor * 50.0),
     )
 
 

@@ -1,8 +1,8 @@
 """The aircraft in three dimensions: what a `Snapshot` says, as nodes of a viser scene.
 
 The scene is carried by the aircraft: the c.g. stays at the origin and the earth moves, so that the view follows a
-flight while the camera belongs to the user. `/ned` turns NED axes into those of the viewer, whose z is up. Lengths of
-what is no part of an aircraft, arrows and cells of grids, go with its size.
+flight while the camera belongs to the user. The first node turns NED axes into those of the viewer, whose z is up.
+Lengths of what is no part of an aircraft, arrows and cells of grids, go with its size.
 """
 
 import collections
@@ -32,6 +32,7 @@ FUSELAGE, DUCT, BLADE, FIRST_BLADE = (92, 104, 118), (150, 160, 170), (52, 60, 7
 THRUST, MOMENT, PATH, TRAIL = (0, 114, 178), (204, 121, 167), (0, 158, 115), (90, 100, 110)
 AMBIENT, SUN = 1.9, 1.6  # of light; together they show the colours of what faces up as they are
 TO_SUN = (-2.0, -1.0, -4.0)  # NED
+OPEN_ROTOR = 0.5  # duct_expansion of a rotor without a duct
 REFERENCE_SIZE = 1.15  # m from the c.g. to the furthest tip: of the aircraft that the lengths below are for
 FOG = (60.0, 400.0)  # m
 GRID_SIZE = 2000.0  # m
@@ -87,31 +88,38 @@ class Scene:
     aircraft : Aircraft
     shown : Shown
         May change at any time.
+    name : str
+        Of the node that holds it all. Each scene of a page wants its own: a node that is made again under its name
+        keeps the pose that browsers have of it, unless the new one is another than none.
     """
 
-    def __init__(self, server: ViserServer, aircraft: Aircraft, shown: Shown) -> None:
-        self.aircraft, self._shown = aircraft, shown
+    def __init__(self, server: ViserServer, aircraft: Aircraft, shown: Shown, name: str = "/ned") -> None:
+        self.aircraft, self._shown, self._name = aircraft, shown, name
         self.scale = geometry.size(aircraft) / REFERENCE_SIZE
         self._scene = server.scene
-        self._scene.add_frame("/ned", show_axes=False, wxyz=NED_TO_VIEW)
-        self._earth = self._scene.add_frame("/ned/earth", show_axes=False)
-        self._body = self._scene.add_frame("/ned/body", show_axes=False)
-        _add_light(self._scene, self.scale)
-        self._level, self._ground_plane = _add_grids(self._scene, self.scale, self.cell)
+        self._scene.add_frame(name, show_axes=False, wxyz=NED_TO_VIEW)
+        self._earth = self._scene.add_frame(f"{name}/earth", show_axes=False)
+        self._body = self._scene.add_frame(f"{name}/body", show_axes=False)
+        _add_light(self._scene, name, self.scale)
+        self._level, self._ground_plane = _add_grids(self._scene, name, self.scale, self.cell)
         self._ground: float | None = None
         self.set_ground(None)
-        _add_fuselage(self._scene, aircraft, self.scale)
+        _add_fuselage(self._scene, name, aircraft, self.scale)
         weight = aircraft.body.mass * aircraft.environment.gravity or 1.0  # N; there may be no gravity
         share = weight / len(aircraft.rotors)
         self.newtons_per_metre = share / (ARROW_OF_WEIGHT * self.scale)
         self.moment_per_metre = share / ARROW_OF_MOMENT
         self._rotors = [
-            RotorNodes(self._scene, f"/ned/body/rotor{j}", rotor, self) for j, rotor in enumerate(aircraft.rotors)
+            RotorNodes(self._scene, f"{name}/body/rotor{j}", rotor, self) for j, rotor in enumerate(aircraft.rotors)
         ]
-        self._trail = Trail(self._scene)
+        self._trail = Trail(self._scene, name)
         mass_flow = 2 * aircraft.environment.air_density * sum(math.pi * rotor.radius**2 for rotor in aircraft.rotors)
         induced = math.sqrt(weight / mass_flow) if mass_flow else 1.0  # of hover by momentum theory [m/s]; or a vacuum
         self.inflow_range = (0.0, float(math.ceil(2 * induced)))
+
+    def has_duct(self, rotor: Rotor) -> bool:
+        """True if a rotor is drawn with a duct: one that carries load, or the file's words, for it may carry none."""
+        return rotor.duct_expansion != OPEN_ROTOR or "duct" in self.aircraft.description.lower()
 
     @property
     def cell(self) -> float:
@@ -168,7 +176,7 @@ class Scene:
 
     def remove(self) -> None:
         """Take everything off the scene."""
-        self._scene.remove_by_name("/ned")
+        self._scene.remove_by_name(self._name)
 
 
 class RotorNodes:
@@ -188,7 +196,7 @@ class RotorNodes:
         self._rotor, self._whole = rotor, whole
         self._up = np.asarray(rotor.shaft_direction) / np.linalg.norm(rotor.shaft_direction)
         hub = SO3.from_matrix(hub_axes(rotor.shaft_direction)).wxyz
-        self._duct = _add_duct(scene, f"{name}/duct", rotor, hub)
+        self._duct = _add_duct(scene, f"{name}/duct", rotor, hub) if whole.has_duct(rotor) else None
         self._blades = _add_blades(scene, f"{name}/blades", rotor)
         self._path = scene.add_line_segments(
             f"{name}/path", np.zeros((PATH_POINTS, 2, 3)), PATH, thickness=2.0, thickness_units="screen"
@@ -214,7 +222,8 @@ class RotorNodes:
         hinges, axes = geometry.blade_poses(rotor, azimuths, factor * (matrix @ flap), factor * (matrix @ lag))
         self._blades.batched_positions = hinges.astype(np.float32)
         self._blades.batched_wxyzs = np.array([SO3.from_matrix(one).wxyz for one in axes], dtype=np.float32)
-        _show(self._duct, shown.ducts)
+        if self._duct is not None:
+            _show(self._duct, shown.ducts)
         _show(self._path, shown.paths)
         if shown.paths:
             path = geometry.tip_path(rotor, flap, factor, PATH_POINTS)
@@ -251,13 +260,15 @@ class Trail:
     Parameters
     ----------
     scene : SceneApi
+    name : str
+        Of the node that holds everything.
     """
 
-    def __init__(self, scene: Any) -> None:
+    def __init__(self, scene: Any, name: str) -> None:
         nothing = np.zeros((1, 2, 3))
         style: dict[str, Any] = {"thickness": 1.5, "thickness_units": "screen"}
-        self._node = scene.add_line_segments("/ned/earth/trail", nothing, TRAIL, **style)
-        self._height = scene.add_line_segments("/ned/height", nothing, TRAIL, **style)
+        self._node = scene.add_line_segments(f"{name}/earth/trail", nothing, TRAIL, **style)
+        self._height = scene.add_line_segments(f"{name}/height", nothing, TRAIL, **style)
         self._points: collections.deque[Array] = collections.deque(maxlen=TRAIL_POINTS)
         self._last = -math.inf
         self._before: tuple[float, Array] | None = None
@@ -306,22 +317,22 @@ def _show(node: Any, wanted: bool) -> None:
         node.visible = wanted
 
 
-def _add_light(scene: Any, scale: float) -> None:
+def _add_light(scene: Any, name: str, scale: float) -> None:
     """Sky, haze, light."""
     scene.set_background_image(np.full((2, 2, 3), SKY, dtype=np.uint8), format="png")
     scene.configure_fog(*(max(1.0, scale) * distance for distance in FOG), color=SKY)
     scene.configure_environment_map(None)  # its light would wash out the colours, which mean something here
     scene.configure_default_lights(False)
-    scene.add_light_ambient("/ned/ambient", intensity=AMBIENT)
-    scene.add_light_directional("/ned/sun", intensity=SUN, position=TO_SUN)
+    scene.add_light_ambient(f"{name}/ambient", intensity=AMBIENT)
+    scene.add_light_directional(f"{name}/sun", intensity=SUN, position=TO_SUN)
 
 
-def _add_grids(scene: Any, scale: float, cell: float) -> tuple[Any, Any]:
+def _add_grids(scene: Any, name: str, scale: float, cell: float) -> tuple[Any, Any]:
     """Lines at the origin's height, through which one sees, and the ground; cells, and sections of ten."""
 
-    def add(name: str, opacity: float, fade: float) -> Any:
+    def add(part: str, opacity: float, fade: float) -> Any:
         return scene.add_grid(
-            name,
+            f"{name}/earth/{part}",
             GRID_SIZE * max(1.0, scale),
             GRID_SIZE * max(1.0, scale),
             cell_size=cell,
@@ -337,16 +348,16 @@ def _add_grids(scene: Any, scale: float, cell: float) -> tuple[Any, Any]:
             wxyz=NED_TO_VIEW,  # seen from above
         )
 
-    return add("/ned/earth/level", 0.0, LEVEL_FADE), add("/ned/earth/ground", 1.0, FOG[1])
+    return add("level", 0.0, LEVEL_FADE), add("ground", 1.0, FOG[1])
 
 
-def _add_fuselage(scene: Any, aircraft: Aircraft, scale: float) -> None:
+def _add_fuselage(scene: Any, name: str, aircraft: Aircraft, scale: float) -> None:
     """A body that shows where the nose is, and beams to the hubs."""
     length = 0.4 * geometry.size(aircraft)
-    place = "/ned/body/fuselage"
+    place = f"{name}/body/fuselage"
     scene.add_icosphere(place, 1.0, color=FUSELAGE, scale=(length, 0.26 * length, 0.24 * length), cast_shadow=False)
     scene.add_icosphere(
-        "/ned/body/nose",
+        f"{name}/body/nose",
         1.0,
         color=FIRST_BLADE,
         scale=(0.1 * length, 0.1 * length, 0.09 * length),
@@ -360,7 +371,7 @@ def _add_fuselage(scene: Any, aircraft: Aircraft, scale: float) -> None:
                 radius=0.018 * scale, segment=np.array([np.zeros(3), rotor.hub]), sections=12
             )
             scene.add_mesh_simple(
-                f"/ned/body/beam{j}", beam.vertices, beam.faces, color=FUSELAGE, cast_shadow=False, side="double"
+                f"{name}/body/beam{j}", beam.vertices, beam.faces, color=FUSELAGE, cast_shadow=False, side="double"
             )
 
 

@@ -100,6 +100,7 @@ class View:
         self._frames = 0
         self._shown = Shown()
         self._scene: Scene | None = None
+        self._scenes = 0
         self._columns: list[ChartColumn] = []
         self._viewpoint = Viewpoint(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
@@ -207,7 +208,8 @@ class View:
         if self._scene is None or not _same(aircraft, self._scene.aircraft):
             if self._scene is not None:
                 self._scene.remove()
-            self._scene = Scene(self._server, aircraft, self._shown)
+            self._scenes += 1
+            self._scene = Scene(self._server, aircraft, self._shown, f"/ned{self._scenes}")
             self._viewpoint.use(self._scene.scale)
             for column in self._columns:
                 column.remove()

@@ -37,8 +37,9 @@ class Viewpoint:
         self._set_first()
         if ratio != 1.0:
             for client in self._server.get_clients().values():
-                client.camera.position = ratio * client.camera.position
-                client.camera.look_at = ratio * client.camera.look_at
+                position, look_at = ratio * client.camera.position, ratio * client.camera.look_at
+                client.camera.position = position
+                client.camera.look_at = look_at  # last: a camera that is moved goes on to look the same way
 
     def place(self, client: Any, name: str) -> None:
         """Look at the aircraft from one of the places."""

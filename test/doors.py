@@ -669,7 +669,7 @@ def _small_log() -> bytes:
 
 
 def _unsigned(metadata: dict[str, str]) -> dict[str, str]:
-    return {key: value for key, value in metadata.items() if "crc" not in key and "checksum" not in key}
+    return {key: value for key, value in metadata.items() if key not in ("crc32", "recording_id")}
 
 
 SMALL_LOG = _small_log()

@@ -28,6 +28,9 @@ def make_parser() -> Parser:
         metavar="FILE",
         help=".png, .svg or .html; may be given several times (default: the log's name with .png)",
     )
+    parser.add_argument(
+        "--flight", type=int, metavar="NUMBER", help="which flight of a file that was made of several, from 1"
+    )
     return parser
 
 
@@ -39,7 +42,7 @@ def _work(arguments: argparse.Namespace) -> None:
     targets = arguments.out or [Path(f"{arguments.file.stem or 'log'}.png")]  # "." has no name
     for path in targets:
         check_target(path, SUFFIXES)
-    log = read(arguments.file)
+    log = read(arguments.file).flight(arguments.flight)
     if not log.complete:
         print(f"{arguments.file} is not complete: {'; '.join(log.reasons)}", file=sys.stderr)
     for path in targets:

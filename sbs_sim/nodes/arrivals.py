@@ -39,7 +39,7 @@ class Arrivals(Refusals):
         super().__init__(node, name)
         self._log = log
         self._topic = node.resolve_topic_name(name)
-        self._channel = log.channel(self._topic, kind, qos) if log else 0
+        self._channel = log.channel(self._topic, kind, qos, name) if log else 0
         self._heard = False  # at least one publisher has been there
         self.restart()
 

@@ -69,8 +69,8 @@ class Parameter:
 class Log(Protocol):
     """Where messages are recorded; see `sbs_sim.nodes.recording.Recording`."""
 
-    def channel(self, topic: str, kind: Any, qos: QoSProfile) -> int:
-        """Channel for the messages of a topic."""
+    def channel(self, topic: str, kind: Any, qos: QoSProfile, role: str) -> int:
+        """Channel for the messages of a topic, by its full name and by its name in the flight."""
 
     def write(self, channel: int, time: float, data: bytes, wait: bool = False, essential: bool = False) -> None:
         """Record a serialised message of a simulation time [s]."""
@@ -92,7 +92,7 @@ class Topic:
     def __init__(self, node: Node, kind: Any, name: str, qos: QoSProfile, log: Log | None = None) -> None:
         self._publisher = node.create_publisher(kind, name, qos)
         self._log = log
-        self._channel = log.channel(self._publisher.topic_name, kind, qos) if log else 0
+        self._channel = log.channel(self._publisher.topic_name, kind, qos, name.lstrip("/")) if log else 0
 
     def publish(self, message: Any, time: float, wait: bool = False, essential: bool = False) -> None:
         """Publish a message of a simulation time [s]; for `wait` and `essential` see `LogWriter.write`."""

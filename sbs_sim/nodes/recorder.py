@@ -4,6 +4,7 @@ Not a node: messages come serialised from the publishers (`sbs_sim.nodes.host.To
 """
 
 import datetime
+import importlib.metadata
 import itertools
 import os
 import re
@@ -14,12 +15,13 @@ from ament_index_python.packages import get_package_share_directory
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from sbs_sim.errors import RecordingError
-from sbs_sim.recording import LogWriter, message_definition, qos_profiles
+from sbs_sim.recording import LogWriter, message_definition, qos_profiles, type_hash
 from sbs_sim.recording.flight import attachments, simulation_metadata
 from sbs_sim.simulation import Simulation
 from sbs_sim.versions import versions
 
 LONGEST_NAME = 60  # characters of the aircraft's that go into the file's
+RCLPY_OF = {"3": "humble", "4": "iron", "7": "jazzy", "9": "kilted"}  # distributions by the first number of its version
 CLOSING_TIME = 10.0  # s to get the rest of a log onto the disk
 
 
@@ -42,11 +44,10 @@ class Recorder:
 
     def __init__(self, record: str, simulation: Simulation, parameters: dict[str, Any]) -> None:
         begin = datetime.datetime.now(datetime.timezone.utc).astimezone()
-        self.path = log_path(record, simulation.aircraft.name, begin)
-        self._channels: dict[str, int] = {}
+        self._channels: dict[str, tuple[Any, int]] = {}
         own_versions = versions()
         self._writer = LogWriter(
-            self.path,
+            log_path(record, simulation.aircraft.name, begin),
             library=f"sbs_sim {own_versions['sbs_sim']}",
             wall_start=round(begin.timestamp() * 1e9),
             metadata={
@@ -55,7 +56,13 @@ class Recorder:
                 "parameters": {name: repr(value) for name, value in parameters.items()},
             },
             attachments=attachments(simulation.aircraft),
+            ros_distro=ros_distro(),
         )
+
+    @property
+    def path(self) -> Path:
+        """Where the log is."""
+        return self._writer.path
 
     @property
     def dropped(self) -> int:
@@ -67,15 +74,19 @@ class Recorder:
         """Why the log cannot go on; empty if it can."""
         return self._writer.failed
 
-    def channel(self, topic: str, kind: Any, qos: QoSProfile) -> int:
-        """Channel for the messages of a topic."""
+    def channel(self, topic: str, kind: Any, qos: QoSProfile, role: str) -> int:
+        """Channel for the messages of a topic that has a role in the flight."""
         if topic in self._channels:  # several nodes publish it
-            return self._channels[topic]
+            known, number = self._channels[topic]
+            if known is not kind:
+                raise RecordingError(f"topic {topic} cannot be recorded with two types, see the remaps")
+            return number
         package, name = kind.__module__.split(".")[0], kind.__name__
         type_name = f"{package}/msg/{name}"
-        definition = message_definition(type_name, definition_file)
-        self._channels[topic] = self._writer.add_channel(topic, type_name, definition, offered(qos))
-        return self._channels[topic]
+        definition, digest = message_definition(type_name, definition_file), type_hash(type_name, definition_file)
+        number = self._writer.add_channel(topic, type_name, definition, offered(qos), digest, role)
+        self._channels[topic] = kind, number
+        return number
 
     def write(self, channel: int, time: float, data: bytes, wait: bool = False, essential: bool = False) -> None:
         """Record a serialised message of a simulation time [s]; one that finds no room is counted, not waited for."""
@@ -122,6 +133,20 @@ def definition_file(package: str, place: str) -> Path:
         The package is not installed.
     """
     return Path(get_package_share_directory(package)) / place
+
+
+def ros_distro() -> str:
+    """Name of the distribution of ROS 2 that runs; empty where nothing tells it.
+
+    An installed one says it in the environment. The wheels do not: there rclpy's version does (REP 2000).
+    """
+    if name := os.environ.get("ROS_DISTRO"):
+        return name
+    try:
+        version = importlib.metadata.version("rclpy")
+    except importlib.metadata.PackageNotFoundError:
+        return ""
+    return RCLPY_OF.get(version.split(".")[0], "")
 
 
 def offered(qos: QoSProfile) -> str:

@@ -37,7 +37,7 @@ class Recording(Component):
     def __init__(self, simulation: Simulation, loop: FlightLoop, parameters: dict[str, Any]) -> None:
         super().__init__("recorder")
         self._simulation, self._loop, self._parameters = simulation, loop, parameters
-        self._topics: list[tuple[str, Any, QoSProfile]] = []
+        self._topics: list[tuple[str, Any, QoSProfile, str]] = []
         self._lock = threading.Lock()  # topics may be added while a log begins
         self._log: Recorder | None = None
         # Starts are counted as the flight hands them out, its own is 0: that of a log which has ended already is not
@@ -50,12 +50,12 @@ class Recording(Component):
 
     # ------------------------------------------------------------------------------------- what the nodes write into
 
-    def channel(self, topic: str, kind: Any, qos: QoSProfile) -> int:
-        """Channel for the messages of a topic, in this log and in all that follow."""
+    def channel(self, topic: str, kind: Any, qos: QoSProfile, role: str) -> int:
+        """Channel for the messages of a topic that has a role in the flight, in this log and in all that follow."""
         with self._lock:
-            self._topics.append((topic, kind, qos))
+            self._topics.append((topic, kind, qos, role))
             if self._log is not None:
-                self._channels.append(self._log.channel(topic, kind, qos))
+                self._channels.append(self._log.channel(topic, kind, qos, role))
             return len(self._topics) - 1
 
     def write(self, channel: int, time: float, data: bytes, wait: bool = False, essential: bool = False) -> None:

@@ -42,6 +42,7 @@ from sbs_sim.recording import Log, message_definition, read, recover
 from sbs_sim.recording.definitions import parse
 from sbs_sim.recording.flight import TOLERANCE, Flight, Verification, flight_of, verify, whole_until
 from sbs_sim.recording.playback import Playback
+from sbs_sim.recording.roles import mixed, several
 from sbs_sim.simulation import begun, refly
 from sbs_sim.versions import in_words
 
@@ -123,6 +124,7 @@ class Replay(Component):
         if unknown := set(topics) - {name for channel in channels.values() for name in _names(channel)}:
             names = ", ".join(sorted({channel.topic for channel in channels.values()}))
             raise SbsError(f"--topics {min(unknown)}: the log has {names or 'none'}")
+        self._refuse_mixture([channel for channel in channels.values() if not topics or _names(channel) & set(topics)])
         found: dict[int, Any] = {}
         by_topic: dict[str, tuple[Any, Any]] = {}
         for channel in channels.values():
@@ -143,6 +145,12 @@ class Replay(Component):
                     self.get_logger().warning(f"{channel.topic}: partly left out, it was recorded with two types")
                     del found[channel.id]
         return found
+
+    def _refuse_mixture(self, wanted: Sequence[Channel]) -> None:
+        """Raise SbsError if a topic would have the messages of several flights."""
+        parts = self._playback.flights
+        if mixed(wanted, parts):
+            raise SbsError(several(self._playback.path, [part.title for part in parts]))
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         with self._wake:
@@ -342,7 +350,10 @@ def fly_with(
     # rotors of another speed have another step: what acted acts at the same time
     step_size = begun(aircraft, flight.events, **flight.options).step_size
     shorter = flight.step_size / step_size
-    events = tuple(replace(event, step=round(event.step * shorter)) for event in flight.events)
+    events = tuple(
+        replace(event, step=round(event.step * shorter), wind_step=round(event.wind_step * shorter))
+        for event in flight.events
+    )
     simulation = begun(aircraft, events, **flight.options)
     log = Recorder(str(output), simulation, {"with": list(changes)})
     try:
@@ -382,31 +393,32 @@ def _write_flight(
     """Fly to a step and record; the number of steps that were flown."""
     made = StateMessages(flight.aircraft)
     kinds = {
-        "/clock": (Clock, STATE_QOS),
-        "/events": (FlightEvent, EVENT_QOS),
-        "/state": (BodyState, STATE_QOS),
-        "/rotors": (RotorStateArray, STATE_QOS),
-        "/inflow": (InflowArray, STATE_QOS),
-        "/odom": (Odometry, STATE_QOS),
+        "clock": (Clock, STATE_QOS),
+        "events": (FlightEvent, EVENT_QOS),
+        "state": (BodyState, STATE_QOS),
+        "rotors": (RotorStateArray, STATE_QOS),
+        "inflow": (InflowArray, STATE_QOS),
+        "odom": (Odometry, STATE_QOS),
     }
-    places = {topic: log.channel(topic, kind, qos) for topic, (kind, qos) in kinds.items()}
+    names = {role: flight.topics.get(role, f"/{role}") for role in kinds}  # as the recorded flight has them
+    places = {role: log.channel(names[role], kind, qos, role) for role, (kind, qos) in kinds.items()}
 
-    def keep(topic: str, message: Any, now: float) -> None:
-        log.write(places[topic], now, serialize_message(message), wait=True)
+    def keep(role: str, message: Any, now: float) -> None:
+        log.write(places[role], now, serialize_message(message), wait=True)
 
     events = [event for event in flight.events if event.step <= last]
     for event in events:
-        keep("/events", event_message(event, step_size), event.step * step_size)
+        keep("events", event_message(event, step_size), event.step * step_size)
     first = flown = flight.events[0].step
     try:
         for snapshot in refly(flight.aircraft, events, last, **flight.options):
             if stop.is_set():
                 raise KeyboardInterrupt
             made.fill(snapshot)
-            keep("/clock", Clock(clock=to_time(snapshot.time)), snapshot.time)
-            for topic, message in (("/state", made.state), ("/rotors", made.rotors), ("/inflow", made.inflow)):
-                keep(topic, message, snapshot.time)
-            keep("/odom", made.odom, snapshot.time)
+            keep("clock", Clock(clock=to_time(snapshot.time)), snapshot.time)
+            for role, message in (("state", made.state), ("rotors", made.rotors), ("inflow", made.inflow)):
+                keep(role, message, snapshot.time)
+            keep("odom", made.odom, snapshot.time)
             flown = snapshot.step
             if progress is not None:
                 progress(flown - first, last - first)
@@ -426,7 +438,7 @@ def main(args: list[str] | None = None) -> None:
             signal.signal(signal.SIGINT, signal.default_int_handler)  # what is half written is to be taken away
             sys.exit(_recover(options.file, options.out))
         if options.verify:
-            sys.exit(_verify(options.file))
+            sys.exit(_verify(options.file, options.flight))
         if options.changes:
             sys.exit(_fly_with(options))
         sys.exit(_replay(options))
@@ -449,6 +461,9 @@ def make_parser() -> Parser:
     parser.add_argument("--start", type=float, default=0.0, help="where to begin [s after the first message]")
     parser.add_argument(
         "--end", type=float, default=float("inf"), help="where to end [s after the first message]; with --set too"
+    )
+    parser.add_argument(
+        "--flight", type=int, metavar="NUMBER", help="which flight of a file that was made of several, from 1"
     )
     parser.add_argument("--loop", action="store_true", help="begin again at the end")
     parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, all if not given; after FILE")
@@ -501,6 +516,8 @@ def _check(parser: Parser, options: argparse.Namespace, spelled: tuple[str, str]
         parser.error(f"--delay {options.delay}: allowed are 0 to {LONGEST_DELAY:g}")
     if not 0.0 <= options.end <= float("inf"):
         parser.error(f"--end {options.end}: allowed is 0 or more")
+    if options.flight is not None and options.recover:
+        parser.error("--flight: not allowed with --recover, which keeps them all")
     if options.out and not (options.recover or options.changes):
         parser.error(f"{out}: allowed with --recover and {change}")
     if not 0.0 <= options.start <= options.end:
@@ -511,7 +528,7 @@ def _replay(options: argparse.Namespace) -> int:
     """Play until the end of the log or an interruption."""
     ended = threading.Event()
     players: list[Replay] = []
-    with Playback(options.file) as playback, progress_bar("s") as progress:
+    with Playback(options.file, options.flight) as playback, progress_bar("s") as progress:
 
         def make() -> list[Component]:
             how = (options.rate, options.start, options.end, options.loop, options.topics, options.delay)
@@ -545,9 +562,9 @@ def _tell_if_broken(log: Log) -> None:
         print(f"{log.path} is not whole: {log.reasons[0]}", file=sys.stderr)
 
 
-def _verify(path: Path) -> int:
+def _verify(path: Path, number: int | None) -> int:
     """0 if every state came again as it should."""
-    flight = _flight(path)
+    flight = _flight(path, number)
     with progress_bar("state") as progress:
         found = verify(flight, progress)
     print(_verdict(found))
@@ -572,16 +589,16 @@ def _verdict(found: Verification) -> str:
     return f"{within} the tolerance of {TOLERANCE:g} for other versions, {found.states} states"
 
 
-def _flight(path: Path) -> Flight:
+def _flight(path: Path, number: int | None) -> Flight:
     """Flight of a log; the log itself, several times as large, is not kept while it is flown again."""
-    log = read(path)
+    log = read(path).flight(number)
     _tell_if_broken(log)
     return flight_of(log)
 
 
 def _fly_with(options: argparse.Namespace) -> int:
     """Fly the commands again, if they are all there."""
-    log = read(options.file)
+    log = read(options.file).flight(options.flight)
     flight = flight_of(log)
     first = flight.events[0].step  # 0 but for a log that was begun in mid-flight
     wanted = flight.steps[(flight.steps - first) * flight.step_size <= options.end + ROUNDING]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from sbs_sim.errors import RecordingError
 
 if TYPE_CHECKING:
-    from sbs_sim.recording.definitions import message_definition, qos_profiles
+    from sbs_sim.recording.definitions import message_definition, qos_profiles, type_hash
     from sbs_sim.recording.log import Log, Topic, read
     from sbs_sim.recording.mcap_log import LogWriter
     from sbs_sim.recording.recovery import Recovery, recover
@@ -25,8 +25,19 @@ _HOME = {
     "qos_profiles": "definitions",
     "read": "log",
     "recover": "recovery",
+    "type_hash": "definitions",
 }
-__all__ = ["Log", "LogWriter", "Recovery", "Topic", "message_definition", "qos_profiles", "read", "recover"]
+__all__ = [
+    "Log",
+    "LogWriter",
+    "Recovery",
+    "Topic",
+    "message_definition",
+    "qos_profiles",
+    "read",
+    "recover",
+    "type_hash",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -1,5 +1,6 @@
 """Message definitions: their text as recordings carry it, and what the text says of fields and units."""
 
+import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -108,6 +109,28 @@ def message_definition(type_name: str, find_file: Callable[[str, str], Path]) ->
     if short_name(type_name).count("/") != 1:
         raise RecordingError(f"message type {type_name!r}: allowed is package/msg/Type")
     return text_of(short_name(type_name))
+
+
+def type_hash(type_name: str, find_file: Callable[[str, str], Path]) -> str:
+    """Hash by which ROS 2 tells types of one name apart (REP 2016), as the installed description of the type has it.
+
+    Parameters
+    ----------
+    type_name, find_file
+        See `message_definition`.
+
+    Returns
+    -------
+    str
+        RIHS01_ and 64 hexadecimal digits; empty where there is no description, as before ROS 2 Iron.
+    """
+    package, kind = short_name(type_name).split("/")
+    try:
+        description = json.loads(find_file(package, f"msg/{kind}.json").read_text(encoding="utf-8"))
+        hashes = {item["type_name"]: str(item["hash_string"]) for item in description["type_hashes"]}
+    except (OSError, LookupError, TypeError, ValueError):
+        return ""
+    return hashes.get(f"{package}/msg/{kind}", "")
 
 
 def parse(type_name: str, text: str) -> Definitions:

@@ -20,6 +20,7 @@ from sbs_sim.errors import RecordingError
 from sbs_sim.model.wind import Wind
 from sbs_sim.recording.log import Log, Topic
 from sbs_sim.recording.mcap_file import RECOVERY
+from sbs_sim.recording.roles import alike
 from sbs_sim.simulation import Event, Simulation, Snapshot, refly
 from sbs_sim.versions import differences
 
@@ -58,6 +59,8 @@ class Flight(ByContent):
         [s]
     versions : dict of str to str
         Of everything that decides a result.
+    topics : dict of str to str
+        Names of the recorded topics by their role: `state`, `events`, ...
     folder : TemporaryDirectory
         Holds the files of the aircraft as long as the flight is there.
     """
@@ -69,6 +72,7 @@ class Flight(ByContent):
     states: Array
     step_size: float
     versions: dict[str, str]
+    topics: dict[str, str]
     folder: "tempfile.TemporaryDirectory[str]" = field(repr=False, compare=False)
 
 
@@ -152,6 +156,9 @@ def flight_of(log: Log) -> Flight:
     RecordingError
         The log is not one of this package's, or lacks a part.
     """
+    log = log.flight()
+    if log.recordings > 1:
+        raise RecordingError(alike(log.path, log.recordings))
     try:
         simulation, recorded = log.metadata["simulation"], log.metadata["versions"]
         folder = tempfile.TemporaryDirectory(prefix="sbs_sim-")
@@ -160,6 +167,8 @@ def flight_of(log: Log) -> Flight:
             raise RecordingError("the aircraft in the log is not the one that was flown: its hash differs")
         if not len(log["events"].time) or not len(log["state"].time):
             raise RecordingError("the log holds no flight of sbs_sim: it has no events or no states")
+        if (starts := int(np.sum(log["events"]["kind"] == "start"))) > 1:  # older logs, of which others made one
+            raise RecordingError(f"{log.path} has {starts} starts of a flight on {log['events'].name}: one, but twice?")
         step_size = checks.number("step_size", float(simulation["step_size"]), 1e-8, 1.0, "s", RecordingError)
         steps, states = _states(log, aircraft, step_size)
         if not len(steps):
@@ -169,7 +178,7 @@ def flight_of(log: Log) -> Flight:
             raise RecordingError(f"the log has no states for more than {LONGEST_GAP:g} s of its flight")
         options = {name: _option(simulation[name], kind) for name, kind in OPTIONS.items()}
         options[GROUND] = float(simulation.get(GROUND, "-inf"))
-        return Flight(aircraft, options, events, steps, states, step_size, dict(recorded), folder)
+        return Flight(aircraft, options, events, steps, states, step_size, dict(recorded), log.roles, folder)
     except KeyError as error:
         raise RecordingError(f"the log holds no flight of sbs_sim: {error.args[0]} is missing") from None
     except (ValueError, IndexError, TypeError, OverflowError) as error:  # of our names, but with other contents

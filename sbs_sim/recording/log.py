@@ -1,7 +1,7 @@
 """Reading a recording into arrays: `log["state"]["position.x"]`."""
 
 import importlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording.cdr import Columns, decode
 from sbs_sim.recording.definitions import Definitions, Units, parse, short_name
-from sbs_sim.recording.mcap_file import START
+from sbs_sim.recording.mcap_file import RECORDING_ID, START
+from sbs_sim.recording.roles import Part, alike, check_flight, flights, several, unclaimed
 from sbs_sim.recording.scan import Content, Scan, Source, scan
 
 Row = tuple[int, int, bytes]  # log time [ns], number, data
@@ -104,7 +105,10 @@ class Topic(Mapping[str, NDArray[Any]]):
 
 
 class Log(Mapping[str, Topic]):
-    """A recording in memory: topics by name, with or without the leading slash.
+    """A recording in memory: topics by name, with or without the leading slash, or by their role in the flight.
+
+    `log["state"]` is the topic with the states, whatever a namespace or a remap has made of its name; `log["/state"]`
+    is the topic of that name.
 
     Attributes
     ----------
@@ -117,15 +121,23 @@ class Log(Mapping[str, Topic]):
         True if all that was recorded is here.
     reasons : tuple of str
         What is wrong with the file, one line each.
+    flights : tuple of Log
+        Those of a file that was made of several, each with its own topics, metadata and attachments; the log itself if
+        it holds one; empty if it holds none.
+    recordings : int
+        How many have left their metadata in it.
     """
 
-    def __init__(self, path: Path, found: Scan, topics: dict[str, Topic]) -> None:
+    def __init__(self, path: Path, found: Scan, topics: Sequence[Topic], part: Part | None, alone: bool = True) -> None:
         self.path = path
-        self.metadata = found.metadata
-        self.attachments = {name: attachment.data for name, attachment in found.attachments.items()}
         self.complete = found.complete
         self.reasons = tuple(found.reasons)
-        self._topics = topics
+        self._part = part
+        belongings = Belongings(found, None if part is None or alone else part.recording_id)
+        self.metadata, self.attachments = belongings.metadata, belongings.attachments
+        self.recordings = belongings.recordings
+        self._topics = {topic.name: topic for topic in topics}
+        self.flights: tuple[Log, ...] = () if part is None else (self,)
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -133,13 +145,46 @@ class Log(Mapping[str, Topic]):
         return tuple(self._topics)
 
     @property
+    def roles(self) -> dict[str, str]:
+        """Names of the topics by their role in the flight: `state`, `rotors`, `events`, ..."""
+        roles = {} if self._part is None else self._part.roles
+        return {role: names[0] for role, names in roles.items() if len(names) == 1}
+
+    @property
+    def title(self) -> str:
+        """What tells the flight from others: aircraft, topic of its states, and when it began."""
+        aircraft = self.metadata.get("simulation", {}).get("aircraft", "")
+        return " on ".join(filter(None, (aircraft, "" if self._part is None else self._part.title)))
+
+    @property
     def wall_start_ns(self) -> int | None:
         """Wall time of the start [ns since 1970], if the recording says it."""
         text = self.metadata.get(START, {}).get("wall_start_ns")
         return None if text is None else int(text)
 
+    def flight(self, number: int | None = None) -> "Log":
+        """One flight of the file, counted from 1; without a number the log itself, if it does not hold several.
+
+        Raises
+        ------
+        RecordingError
+            There is no such flight, or there are several and no number says which.
+        """
+        if number is None:
+            if len(self.flights) > 1:
+                raise RecordingError(several(self.path, [flight.title for flight in self.flights]))
+            if self.recordings > 1 and self.flights:
+                raise RecordingError(alike(self.path, self.recordings))
+            return self
+        check_flight(self.path, number, len(self.flights))
+        return self.flights[number - 1]
+
     def __getitem__(self, name: str) -> Topic:
-        for key in (name, f"/{name}"):
+        if name not in self._topics and any(name in flight.roles for flight in self.flights if flight is not self):
+            raise KeyError(several(self.path, [flight.title for flight in self.flights]))
+        role = self.roles.get(name, name)
+        stated = self._part is not None and self._part.stated
+        for key in (name, *((role, f"/{name}") if stated else (f"/{name}", role))):
             if key in self._topics:
                 return self._topics[key]
         raise KeyError(f"{self.path} has no topic {name!r}; there are {', '.join(self._topics) or 'none'}")
@@ -153,6 +198,42 @@ class Log(Mapping[str, Topic]):
     def __repr__(self) -> str:
         state = "complete" if self.complete else "incomplete"
         return f"<{state} recording {self.path} of {', '.join(self._topics) or 'nothing'}>"
+
+
+class Belongings:
+    """Metadata and attachments of one recording of a file, or of all of them.
+
+    Parameters
+    ----------
+    found : Scan
+    recording_id : str or None
+        See `LogWriter`; empty for what has none, None for all.
+
+    Attributes
+    ----------
+    metadata, attachments : dict
+        See `Log`.
+    recordings : int
+        How many different ones they come from.
+    """
+
+    def __init__(self, found: Scan, recording_id: str | None) -> None:
+        records = [(name, data.get(RECORDING_ID, ""), data) for name, data in found.metadata]
+        records.sort(key=lambda record: record[1] != "")  # what is said of all of them comes first
+        starts = [(identity, data.get("wall_start_ns", "")) for name, identity, data in records if name == START]
+        own = {begin for identity, begin in starts if recording_id in (None, identity)}
+        others = {begin for _, begin in starts} - own  # the attachments of each were made when it began
+        self.metadata = {
+            name: {key: value for key, value in data.items() if key != RECORDING_ID}
+            for name, identity, data in records
+            if recording_id is None or identity in ("", recording_id)
+        }
+        self.attachments = {
+            attachment.name: attachment.data
+            for attachment in found.attachments
+            if str(attachment.create_time) not in others
+        }
+        self.recordings = len(own)
 
 
 def read(path: str | Path) -> Log:
@@ -184,27 +265,46 @@ def read(path: str | Path) -> Log:
     for number in messages.keys() - found.channels.keys():
         found.reasons.append(f"{len(messages[number])} messages of a topic whose definition is lost")
         found.complete = False
-    topics: dict[str, Topic] = {}
-    for topic, schema, numbers in _by_topic(source, found):
+    for channel in found.channels.values():
+        if not channel.schema_id:
+            found.reasons.append(f"topic {channel.topic} has no type and is left out")
+    parts = flights(found.channels, found.schemas)
+    if len(parts) < 2:
+        return Log(source.path, found, _topics(source, found, messages, found.channels), *parts or (None,))
+    others = unclaimed(found.channels, parts)
+    log = Log(source.path, found, _topics(source, found, messages, found.channels), None)
+    log.flights = tuple(
+        Log(source.path, found, _topics(source, found, messages, part.channels | others), part, alone=False)
+        for part in parts
+    )
+    return log
+
+
+def _topics(source: Source, found: Scan, messages: Mapping[int, Sequence[Row]], wanted: Collection[int]) -> list[Topic]:
+    """Topics with all their messages, those of the channels that are wanted."""
+    topics = []
+    for topic, schema, numbers in _by_topic(source, found, wanted):
         rows = [row for number in numbers for row in messages.get(number, ())]
         if len(numbers) > 1:
             rows.sort(key=lambda row: row[0])
-        topics[topic] = Topic(topic, schema, rows)
-    return Log(source.path, found, topics)
+        topics.append(Topic(topic, schema, rows))
+    return topics
 
 
-def _by_topic(source: Source, found: Scan) -> list[tuple[str, Schema, list[int]]]:
+def _by_topic(source: Source, found: Scan, wanted: Collection[int]) -> list[tuple[str, Schema, list[int]]]:
     """Topics with their type and channels; other writers have a channel for each publisher, and topics without type."""
     topics: dict[str, tuple[str, Schema, list[int]]] = {}
     for number, channel in sorted(found.channels.items()):
-        if not channel.schema_id:
-            found.reasons.append(f"topic {channel.topic} has no type and is left out")
+        if number not in wanted or not channel.schema_id:
             continue
         schema = found.schemas[channel.schema_id]
         _, first, numbers = topics.setdefault(channel.topic, (channel.topic, schema, []))
-        if (first.name, first.data) != (schema.name, schema.data):
+        if (first.name, first.data) == (schema.name, schema.data):
+            numbers.append(number)
+        elif channel.metadata.get(RECORDING_ID) == found.channels[numbers[0]].metadata.get(RECORDING_ID):
             raise RecordingError(f"cannot read {source.path}: topic {channel.topic} is recorded with two types")
-        numbers.append(number)
+        else:
+            found.reasons.append(f"topic {channel.topic} has another type in another flight, and is found there alone")
     return list(topics.values())
 
 

@@ -53,6 +53,10 @@ ROSBAG2 = "rosbag2"  # metadata record of that name is rosbag2's
 START = "recording"  # metadata record that every file of ours begins with,
 RECOVERY = "recovery"  # and the one that every recovered file ends with
 BAG_VERSION = 9  # of rosbag2's metadata, Jazzy's
+# Keys of the metadata of a topic, and the first of metadata records too: programs that merge files keep them.
+RECORDING_ID = "recording_id"  # which recording it belongs to,
+ROLE = "role"  # and what the topic is in it, however it is called
+DISTRO = "ros_distro"  # key of START, and of rosbag2's metadata
 
 Message = tuple[int, int, int, int, bytes]  # channel, sequence, log time [ns], publish time [ns], data
 
@@ -74,6 +78,7 @@ class FileBuilder:
         self.channels: dict[int, Channel] = {}
         self._crc = 0
         self._defined = 0
+        self._in_chunks: tuple[set[int], set[int]] = set(), set()  # schemas and channels whose definitions stand in one
         self._definitions_due = 0
         self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
         self._counts: defaultdict[int, int] = defaultdict(int)
@@ -143,7 +148,14 @@ class FileBuilder:
         if not self._definitions_due and self._chunk_count % DEFINITIONS_PERIOD:
             return b""
         self._definitions_due = max(0, self._definitions_due - 1)
-        return b"".join(map(serialize, [*schemas.values(), *channels.values()]))
+        self._in_chunks = set(schemas), set(channels)
+        return _serialized([*schemas.values(), *channels.values()])
+
+    def _other_definitions(self) -> bytes:
+        """Definitions of the topics that came after the last chunk: readers want to have met all of the summary's."""
+        schemas, channels = self._in_chunks
+        others: list[McapRecord] = [schema for number, schema in self.schemas.items() if number not in schemas]
+        return _serialized([*others, *(channel for number, channel in self.channels.items() if number not in channels)])
 
     def _indexed(self, chunk: Chunk, index: dict[int, list[tuple[int, int]]]) -> bytes:
         """A chunk with its message index."""
@@ -173,7 +185,7 @@ class FileBuilder:
         self._last_time = max(self._last_time, chunk.message_end_time)
         return builder.end()
 
-    def finish(self, name: str, custom_data: dict[str, str]) -> bytes:
+    def finish(self, name: str, custom_data: dict[str, str], distro: str = "") -> bytes:
         """Last piece: rosbag2's metadata and the summary.
 
         Parameters
@@ -182,9 +194,12 @@ class FileBuilder:
             The file's name, without its folder.
         custom_data : dict of str to str
             For rosbag2's metadata.
+        distro : str
+            Distribution of ROS 2 that recorded, for the same; empty where it is not known, as rosbag2 has it.
         """
-        bag = bag_metadata(self._statistics(), self.schemas, self.channels, name, custom_data)
-        piece = self.metadata(ROSBAG2, {"serialized_metadata": bag})
+        piece = self._piece(self._other_definitions())
+        bag = bag_metadata(self._statistics(), self.schemas, self.channels, name, custom_data, distro)
+        piece += self.metadata(ROSBAG2, {"serialized_metadata": bag})
         piece += self._piece(serialize(DataEnd(self._crc)))
         return piece + self._summary()
 
@@ -192,7 +207,7 @@ class FileBuilder:
         return Statistics(
             attachment_count=len(self._attachments),
             channel_count=len(self.channels),
-            channel_message_counts={channel: self._counts[channel] for channel in self.channels},
+            channel_message_counts=dict(sorted(self._counts.items())),  # of those that have some
             chunk_count=self._chunk_count,
             message_count=sum(self._counts.values()),
             message_end_time=self._last_time,
@@ -307,6 +322,7 @@ def bag_metadata(
     channels: dict[int, Channel],
     name: str,
     custom_data: dict[str, str],
+    distro: str,
 ) -> str:
     """What rosbag2 of Jazzy writes about a file, as YAML."""
     yaml: Any = YAML(typ="safe", pure=True)
@@ -345,7 +361,7 @@ def bag_metadata(
             "relative_file_paths": [name],
             "files": [{"path": name, **times}],
             "custom_data": custom_data,
-            "ros_distro": "jazzy",
+            DISTRO: distro,
         },
         text,
     )

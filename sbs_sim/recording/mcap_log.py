@@ -6,9 +6,10 @@ system had not yet brought to the disk: some 30 s with the usual settings of Lin
 """
 
 import contextlib
+import functools
+import secrets
 import threading
 from collections.abc import Iterator, Mapping
-from datetime import datetime, timezone
 from pathlib import Path
 from types import TracebackType
 
@@ -17,7 +18,20 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from sbs_sim.errors import RecordingError
-from sbs_sim.recording.mcap_file import CHECKSUM, MAGIC, RECOVERY, ROSBAG2, START, FileBuilder, Message, NewFile
+from sbs_sim.recording.mcap_file import (
+    CHECKSUM,
+    DISTRO,
+    MAGIC,
+    RECORDING_ID,
+    RECOVERY,
+    ROLE,
+    ROSBAG2,
+    START,
+    FileBuilder,
+    Message,
+    NewFile,
+)
+from sbs_sim.recording.roles import wall_clock
 
 FLUSH_PERIOD = 0.2  # s of wall time between chunks
 CHUNK_SIZE = 256 * 1024  # bytes of messages at which a chunk is closed before that
@@ -26,6 +40,7 @@ LARGEST_ATTACHMENT = 1 << 27  # bytes
 LATEST_TIME = 2**63  # ns; MCAP could hold twice that, most readers cannot
 END = "recording_end"  # metadata records of our own
 RESERVED = (START, END, RECOVERY, ROSBAG2)
+RESERVED_KEYS = (CHECKSUM, RECORDING_ID)
 
 
 class LogWriter:
@@ -43,11 +58,18 @@ class LogWriter:
         Metadata records by name.
     attachments : mapping of str to bytes
         Files that belong to the flight by name.
+    ros_distro : str
+        Distribution of ROS 2 that records; empty where there is none.
     queue_length : int
         Messages that may wait for the disk.
 
     Attributes
     ----------
+    path : Path
+        Where it is: a file that is given another name meanwhile is followed.
+    recording_id : str
+        Of this recording alone; its topics and metadata have it, so that they are told from those of others in a file
+        that was made of several.
     written : int
         Messages that are safe with the operating system.
     dropped : int
@@ -69,9 +91,11 @@ class LogWriter:
         wall_start: int,
         metadata: Mapping[str, Mapping[str, str]] | None = None,
         attachments: Mapping[str, bytes] | None = None,
+        ros_distro: str = "",
         queue_length: int = QUEUE_LENGTH,
     ) -> None:
-        self.path = Path(path)
+        self.recording_id = f"{wall_start}-{secrets.token_hex(4)}"  # in the order of time
+        self._distro = ros_distro
         self.written = self.dropped = 0
         self.failed = ""
         self._builder = FileBuilder()
@@ -85,7 +109,7 @@ class LogWriter:
         self._work = threading.Condition(self._lock)
         self._room = threading.Condition(self._lock)
         pieces = self._first_pieces(library, wall_start, metadata or {}, attachments or {})
-        self._file = NewFile(self.path)
+        self._file = NewFile(Path(path))
         try:
             self._file.write(pieces)
         except RecordingError:
@@ -102,12 +126,13 @@ class LogWriter:
         attachments: Mapping[str, bytes],
     ) -> bytes:
         for name, data in metadata.items():
-            if name in RESERVED or CHECKSUM in data:
-                raise RecordingError(f"metadata {name!r}: reserved are {', '.join(RESERVED)} and the key {CHECKSUM}")
-        wall = datetime.fromtimestamp(wall_start / 1e9, tz=timezone.utc).isoformat(timespec="milliseconds")
-        start = {"library": library, "wall_start": wall, "wall_start_ns": str(wall_start)}
-        pieces = [self._builder.start(library), self._builder.metadata(START, start)]
-        pieces += [self._builder.metadata(name, dict(data)) for name, data in metadata.items()]
+            if name in RESERVED or any(key in data for key in RESERVED_KEYS):
+                keys = " and ".join(RESERVED_KEYS)
+                raise RecordingError(f"metadata {name!r}: reserved are {', '.join(RESERVED)} and the keys {keys}")
+        wall = wall_clock(wall_start)
+        start = {"library": library, "wall_start": wall, "wall_start_ns": str(wall_start), DISTRO: self._distro}
+        pieces = [self._builder.start(library), self._metadata(START, start)]
+        pieces += [self._metadata(name, data) for name, data in metadata.items()]
         for name, content in attachments.items():
             if MAGIC in content:  # in a damaged file its chunks could not be told from ours
                 raise RecordingError(f"attachment {name!r} is a recording itself, which cannot be attached")
@@ -119,8 +144,22 @@ class LogWriter:
             pieces.append(self._builder.attachment(attachment))
         return b"".join(pieces)
 
+    @property
+    def path(self) -> Path:
+        """See the class."""
+        return self._file.path
+
+    def _metadata(self, name: str, data: Mapping[str, str]) -> bytes:
+        return self._builder.metadata(name, {RECORDING_ID: self.recording_id, **data})
+
     def add_channel(
-        self, topic: str, type_name: str, schema_text: str, qos_profiles_yaml: str, type_hash: str = ""
+        self,
+        topic: str,
+        type_name: str,
+        schema_text: str,
+        qos_profiles_yaml: str,
+        type_hash: str = "",
+        role: str = "",
     ) -> int:
         """Announce a topic and return the number to write its messages with; at any time, from any thread.
 
@@ -136,6 +175,8 @@ class LogWriter:
             See `sbs_sim.recording.qos_profiles`.
         type_hash : str
             RIHS01_..., where it is known.
+        role : str
+            What the topic is in the recording, however it is called: "state" for one that was remapped to "/h1/body".
 
         Raises
         ------
@@ -154,10 +195,12 @@ class LogWriter:
                         raise RecordingError(f"topic {topic}: {type_name} is recorded with another definition")
                     schema = other
             details = {"offered_qos_profiles": qos_profiles_yaml, "topic_type_hash": type_hash}
-            number = len(builder.channels) + 1
-            builder.schemas = {**builder.schemas, schema.id: schema}
-            builder.channels = {**builder.channels, number: Channel(number, topic, "cdr", details, schema.id)}
+            details |= {RECORDING_ID: self.recording_id, **({ROLE: role} if role else {})}
+            number = len(self._sequence) + 1
             self._sequence[number] = 0
+            if not self._closing:  # the end is being written: what comes now is dropped anyway
+                builder.schemas = {**builder.schemas, schema.id: schema}
+                builder.channels = {**builder.channels, number: Channel(number, topic, "cdr", details, schema.id)}
         return number
 
     def write(self, channel: int, log_time_ns: int, data: bytes, wait: bool = False, essential: bool = False) -> bool:
@@ -235,7 +278,8 @@ class LogWriter:
                     self._in_hand -= len(part)
                     self.written += len(part)
             counts = {"written": str(self.written), "dropped": str(self.dropped)}
-            self._file.write(self._builder.metadata(END, counts) + self._builder.finish(self.path.name, counts))
+            end = self._metadata(END, counts)
+            self._file.write(end + self._builder.finish(self.path.name, counts, self._distro))
             self._file.close()
         except RecordingError as error:
             self._fail(str(error))
@@ -283,9 +327,14 @@ def _parts(batch: list[Message]) -> Iterator[list[Message]]:
 
 def _check_profiles(topic: str, text: str) -> None:
     """What cannot be read back must not be found out at the end of a flight."""
+    if not _is_list(text):
+        raise RecordingError(f"topic {topic}: the QoS profiles are not a YAML list: {text!r}")
+
+
+@functools.cache
+def _is_list(text: str) -> bool:
+    """True for YAML that is a list, or nothing; topics have few different profiles."""
     try:
-        if isinstance(YAML(typ="safe").load(text) or [], list):
-            return
+        return isinstance(YAML(typ="safe").load(text) or [], list)
     except YAMLError:
-        pass
-    raise RecordingError(f"topic {topic}: the QoS profiles are not a YAML list: {text!r}")
+        return False

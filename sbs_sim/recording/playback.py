@@ -11,6 +11,7 @@ from mcap.records import Channel, Schema
 
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording.log import require_something
+from sbs_sim.recording.roles import Part, check_flight, flights, unclaimed
 from sbs_sim.recording.scan import Content, DamageError, Extent, Scan, Source, chunk_at, open_recording, run_at, scan
 
 Entry = tuple[int, int, int, int, bytes]  # log time [ns], place of the chunk and in it, channel, data
@@ -24,11 +25,15 @@ class Playback:
     Parameters
     ----------
     path : Path
+    flight : int, optional
+        Of a file with several flights the one to play, from 1; all of them if it is not given.
 
     Attributes
     ----------
     schemas, channels : dict
-        Records by number.
+        Records by number; of a flight that was chosen its channels and those that belong to none.
+    flights : tuple of Part
+        Those that may be played.
     warning : str
         What is wrong with the file all the same; empty if nothing is.
 
@@ -38,7 +43,7 @@ class Playback:
         The file cannot be read, or is not whole.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, flight: int | None = None) -> None:
         self.path = path
         self._source = Source(path)
         try:
@@ -48,11 +53,20 @@ class Playback:
             else:
                 found = self._all()
                 self.schemas, self.channels, self._chunks = found.schemas, found.channels, found.chunks
+            self.flights = flights(self.channels, self.schemas)
+            if flight is not None:
+                check_flight(path, flight, len(self.flights))
+                self._choose(self.flights[flight - 1])
         except BaseException:
             self.close()
             raise
         unchecked = self._trust.content and bool(self._chunks)
         self.warning = f"{path} has no checksums: damage cannot be found" if unchecked else ""
+
+    def _choose(self, flight: Part) -> None:
+        wanted = flight.channels | unclaimed(self.channels, self.flights)
+        self.channels = {number: self.channels[number] for number in self.channels if number in wanted}
+        self.flights = (flight,)
 
     def _all(self) -> Scan:
         found = scan(self._source, lambda content: None)

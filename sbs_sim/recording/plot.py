@@ -118,7 +118,7 @@ def _draw(axes: Axes, label: str, curves: Curves) -> None:
 
 
 def _topic(log: Log, name: str) -> Topic | None:
-    return log[name] if name in log.topics or f"/{name}" in log.topics else None
+    return log.get(name)
 
 
 def _fields(log: Log, topic: str, names: Mapping[str, str], factor: float = 1.0) -> dict[str, tuple[Array, Array]]:

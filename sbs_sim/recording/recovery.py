@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording.log import require_something
-from sbs_sim.recording.mcap_file import MESSAGE_HEAD, RECOVERY, START, FileBuilder, Message, NewFile
+from sbs_sim.recording.mcap_file import DISTRO, MESSAGE_HEAD, RECOVERY, START, FileBuilder, Message, NewFile
 from sbs_sim.recording.scan import Content, Scan, Source, scan
 
 
@@ -109,11 +109,12 @@ def _copy(source: Source, found: Scan, target: NewFile, tell: Callable[[], None]
     """Write what is whole into the new file; tell what was written."""
     builder, kept = FileBuilder(), _Tally()
     builder.schemas, builder.channels = found.schemas, found.channels
-    target.write(builder.start(found.metadata.get(START, {}).get("library", "unknown")))
-    for name, data in found.metadata.items():
+    recording = dict(found.metadata).get(START, {})
+    target.write(builder.start(recording.get("library", "unknown")))
+    for name, data in found.metadata:
         if name != RECOVERY:
             target.write(builder.metadata(name, data))
-    for attachment in found.attachments.values():
+    for attachment in found.attachments:
         target.write(builder.attachment(attachment))
 
     def take(content: Content) -> None:
@@ -131,7 +132,7 @@ def _copy(source: Source, found: Scan, target: NewFile, tell: Callable[[], None]
         raise RecordingError(f"nothing in {source.path} can be read: the definitions of its topics are lost")
     details = {"complete": str(found.complete).lower(), "lost_bytes": str(found.lost_bytes)}
     target.write(builder.metadata(RECOVERY, {**details, "reasons": "\n".join(found.reasons)}))
-    target.write(builder.finish(target.path.name, {}))
+    target.write(builder.finish(target.path.name, {}, recording.get(DISTRO, "")))
     return kept
 
 

@@ -13,6 +13,7 @@ import io
 import os
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -162,8 +163,10 @@ class Scan:
     ----------
     schemas, channels : dict
         Records by number.
-    metadata : dict of str to dict
-    attachments : dict of str to Attachment
+    metadata : list of (str, dict of str to str)
+        Names and values, in the order of the file; files that were made of several have several of a name.
+    attachments : list of Attachment
+        The same.
     messages : int
         Messages in whole chunks.
     chunks : dict of int to tuple
@@ -178,8 +181,8 @@ class Scan:
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
-    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
-    attachments: dict[str, Attachment] = field(default_factory=dict)
+    metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
+    attachments: list[Attachment] = field(default_factory=list)
     messages: int = 0
     chunks: dict[int, Extent] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
@@ -346,8 +349,9 @@ def _nothing_missing(summary: Summary, found: Scan) -> bool:
     return (
         summary.messages == found.messages
         and summary.chunks.items() <= found.chunks.items()
-        and set(summary.attachments.values()) <= set(found.attachments)
-        and set(summary.metadata.values()) <= {*found.metadata, ROSBAG2}
+        and Counter(summary.attachments.values()) <= Counter(attachment.name for attachment in found.attachments)
+        and Counter(name for name in summary.metadata.values() if name != ROSBAG2)
+        <= Counter(name for name, _ in found.metadata)
     )
 
 
@@ -446,14 +450,14 @@ class _Walk:
             attachment = whole_attachment(data, self._trust.foreign)
             if not struct.unpack("<I", data[-4:])[0]:
                 self.unchecked.add("attachments")
-            self._found.attachments[attachment.name] = attachment
+            self._found.attachments.append(attachment)
             self._sure = following
         elif opcode == Opcode.METADATA:
             metadata = whole_metadata(data, self._trust.foreign)
             if metadata.name != ROSBAG2:
                 if not _is_ours(data):
                     self.unchecked.add("metadata")
-                self._found.metadata[metadata.name] = metadata.metadata
+                self._found.metadata.append((metadata.name, metadata.metadata))
                 self._sure = following
         elif opcode == Opcode.MESSAGE_INDEX:
             if length < 6 or struct.unpack_from("<I", data, 2)[0] != length - 6 or (length - 6) % 16:

@@ -1,10 +1,14 @@
 """Plots of a recorded flight."""
 
 import html.parser
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from foreign_logs import rewrite
 
+from sbs_sim.commands.plot import main
 from sbs_sim.errors import ExportError
 from sbs_sim.recording import read
 from sbs_sim.recording.plot import flight_figure, plot
@@ -61,4 +65,47 @@ def test_what_cannot_be_drawn_is_named(log, tmp_path):
         plot(log, tmp_path / "a.pdf")
     with pytest.raises(ExportError, match="cannot be written: there is no folder"):
         plot(log, tmp_path / "none" / "a.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+WALL = 1_800_000_000 * 10**9  # ns since 1970
+
+
+def curves(log):
+    """Times and values of all curves by their names, and the name of the axis."""
+    figure = flight_figure(log)
+    lines = {line.get_label(): line.get_data() for axes in figure.axes for line in axes.lines}
+    return lines, figure.axes[-1].get_xlabel()
+
+
+def test_a_log_of_another_recorder_is_drawn_over_simulation_time(log, tmp_path):
+    """It has written down when messages came, at half the pace; their stamps tell when they were flown.
+
+    The controls are stamped with zero: theirs follows from when they came.
+    """
+    other = read(rewrite(tmp_path / "other.mcap", LOG, lambda now: WALL + 2 * now + 3_000_000))
+    found, axis = curves(other)
+    expected, _ = curves(log)
+    assert axis == "simulation time [s]"
+    assert found.keys() == expected.keys()
+    for name, (times, values) in expected.items():
+        np.testing.assert_allclose(found[name][0], times, atol=1e-5, err_msg=name)
+        np.testing.assert_array_equal(found[name][1], values)
+
+
+def test_where_nothing_is_stamped_time_begins_with_the_first_message(tmp_path):
+    path = rewrite(tmp_path / "other.mcap", LOG, lambda now: WALL + now, lambda topic: topic == "/controls")
+    found, axis = curves(read(path))
+    assert axis == "time since the first message [s]"
+    times, _ = found["collective"]
+    assert times[0] == 0.0
+    assert times[-1] == pytest.approx(np.ptp(read(path)["controls"].time))
+
+
+def test_a_flight_that_is_not_there_is_one_line(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["plot", str(LOG), "--flight", "2"])
+    with pytest.raises(SystemExit, match="1"):
+        main()
+    assert capsys.readouterr().err == f"{LOG}: flight 2: allowed are 1 to 1\n"
     assert list(tmp_path.iterdir()) == []

@@ -49,6 +49,14 @@ class Topic(Mapping[str, NDArray[Any]]):
         """Time of each message [s], shape (n,)."""
         return self.time_ns.astype(np.float64) / 1e9
 
+    @property
+    def stamp(self) -> NDArray[np.float64] | None:
+        """Time in the header of each message [s], shape (n,); None where the type has no header."""
+        if "header.stamp.sec" not in self:
+            return None
+        seconds: NDArray[np.float64] = self["header.stamp.sec"] + 1e-9 * self["header.stamp.nanosec"]
+        return seconds
+
     @cached_property
     def units(self) -> Mapping[str, str]:
         """Units by the names of the fields, as far as the definition says them; empty where it does not."""

@@ -25,6 +25,9 @@ Curves = Mapping[str, tuple[Array, Array]]  # name to time and values
 
 SUFFIXES = (".png", ".svg", ".html")
 WIDTH, PANEL_HEIGHT = 8.0, 1.7  # in
+SIMULATION_TIME = "simulation time [s]"
+SAME = 1e-6  # s between stamp and log time where the log is in simulation time
+FAR = 1.0  # s from what a message must have been stamped with: some pilots stamp with the time of day, or not at all
 STILL = 1e-6  # what an axis covers at least
 # Fixed, so that the same log gives the same bytes; text stays text.
 SETTINGS: Any = {"svg.hashsalt": "sbs_sim", "svg.fonttype": "none", "font.size": 9.0}
@@ -77,13 +80,14 @@ def flight_figure(log: Log) -> Figure:
     panels = [(label, curves) for label, make in PANELS.items() if (curves := _curves(log, label, make))]
     if not panels:
         raise RecordingError(f"{log.path}: nothing to draw, there are {', '.join(log.topics) or 'no topics'}")
+    _, axis = _axis(log)
     with rc_context(SETTINGS):
         figure = Figure(figsize=(WIDTH, PANEL_HEIGHT * len(panels) + 0.6), layout="constrained")
         FigureCanvasAgg(figure)
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (label, curves) in zip(rows, panels, strict=True):
             _draw(axes, label, curves)
-        rows[-1].set_xlabel("simulation time [s]")
+        rows[-1].set_xlabel(axis)
     return figure
 
 
@@ -114,6 +118,46 @@ def _draw(axes: Axes, label: str, curves: Curves) -> None:
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
 
 
+# --- time ---------------------------------------------------------------------------------------------------------
+
+
+def _axis(log: Log) -> tuple[Callable[[Array], Array] | None, str]:
+    """Function from the log's time to that of the figure [s], None where that is the same; and the name of the axis.
+
+    Other programs write messages down with the time of day at which they came; the stamps of the states tell what time
+    it was in the flight.
+    """
+    known = _known(log)
+    if known is None:
+        begin = min((float(topic.time.min()) for topic in log.values() if len(topic.time)), default=0.0)
+        return (lambda time: time - begin), "time since the first message [s]"
+    times, stamps = known
+    if np.abs(stamps - times).max() < SAME:
+        return None, SIMULATION_TIME
+    order = np.argsort(times, kind="stable")
+    return (lambda time: np.interp(time, times[order], stamps[order])), SIMULATION_TIME
+
+
+def _known(log: Log) -> tuple[Array, Array] | None:
+    """Log times of what the simulator published with the simulation times in their stamps [s]."""
+    for role in ("state", "rotors", "inflow", "status"):
+        found = _topic(log, role)
+        if found is not None and (stamps := found.stamp) is not None and stamps.any():
+            return found.time, stamps
+    return None
+
+
+def _time(log: Log, topic: Topic) -> Array:
+    """Time of the messages of a topic [s]; their own stamps tell it best, where they are of that time at all."""
+    convert, axis = _axis(log)
+    if convert is None:
+        return topic.time
+    time, stamp = convert(topic.time), topic.stamp
+    if stamp is None or axis != SIMULATION_TIME:
+        return time
+    return np.where((stamp != 0.0) & (np.abs(stamp - time) < FAR), stamp, time)
+
+
 # --- what a panel shows -----------------------------------------------------------------------------------------
 
 
@@ -126,7 +170,8 @@ def _fields(log: Log, topic: str, names: Mapping[str, str], factor: float = 1.0)
     found = _topic(log, topic)
     if found is None or not len(found.time):
         return {}
-    return {shown: (found.time, factor * found[field]) for shown, field in names.items() if field in found}
+    time = _time(log, found)
+    return {shown: (time, factor * found[field]) for shown, field in names.items() if field in found}
 
 
 def _attitude(log: Log) -> Curves:
@@ -137,7 +182,8 @@ def _attitude(log: Log) -> Curves:
     angles = np.degrees([quaternion_to_euler(quaternion) for quaternion in quaternions])
     angles[:, 0] = np.degrees(np.unwrap(np.radians(angles[:, 0])))
     names = ("yaw", "pitch", "roll")
-    return {name: (state.time, angles[:, i]) for i, name in enumerate(names)}
+    time = _time(log, state)
+    return {name: (time, angles[:, i]) for i, name in enumerate(names)}
 
 
 def _vector(topic: str, field: str, names: str, factor: float = 1.0) -> Callable[[Log], Curves]:

@@ -265,13 +265,14 @@ def test_a_damaged_topic_is_refused_each_time(tmp_path):
     assert not (tmp_path / "a.svg").exists()
 
 
-def test_a_log_without_a_name_is_refused_like_any_other(capsys, monkeypatch):
+def test_a_log_without_a_name_is_refused_like_any_other(capsys, monkeypatch, tmp_path):
     from sbs_sim.commands import plot as command
 
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["plot", "."])
     with pytest.raises(SystemExit, match="1"):
         command.main()
-    assert capsys.readouterr().err == "cannot read .: Is a directory\n"
+    assert capsys.readouterr().err == "cannot read .: a folder without a log (.mcap)\n"
 
 
 @given(st.text(max_size=5))

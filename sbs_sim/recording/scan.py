@@ -76,6 +76,12 @@ OTHER_RECORDS = frozenset(
 # Records that stand in chunks, or in a file without chunks between the others.
 CONTENT_RECORDS = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
 BLOCK = 1 << 20
+HEAD_SIZE = 64  # bytes that tell what kind of file it is
+PACKED = {b"\x28\xb5\x2f\xfd": "zstd -d", b"\x1f\x8b\x08": "gunzip -k", b"\x04\x22\x4d\x18": "lz4 -d"}
+TO_MCAP = (
+    "`rosbags-convert --src {} --dst NEW --dst-storage mcap` of the Python package rosbags makes one in MCAP of it"
+)
+MOST_NAMES = 3  # that are listed
 MOST_REASONS = 100  # a file of another kind can be wrong at every message
 # What the reading of nonsense can end with: short data, wrong text, a decompressor's complaint, absurd sizes.
 NONSENSE = (
@@ -213,10 +219,16 @@ class Source:
         try:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
             self.size = os.lseek(self._descriptor, 0, os.SEEK_END)
-            os.pread(self._descriptor, 1, 0)  # a folder can be opened, but not read
+            head = os.pread(self._descriptor, HEAD_SIZE, 0)
+        except IsADirectoryError:  # a folder can be opened, but not read
+            self.close()
+            raise RecordingError(f"cannot read {path}: {what_folder(path)}") from None
         except (OSError, ValueError) as error:
             self.close()
             raise RecordingError(f"cannot read {path}: {reason(error)}") from None
+        if other := what_else(path, head):
+            self.close()
+            raise RecordingError(f"cannot read {path}: {other}")
 
     def at(self, offset: int, length: int) -> bytes:
         """Bytes at a place.
@@ -266,6 +278,33 @@ class Source:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def what_folder(path: Path) -> str:
+    """What to do with a folder where a log is wanted; rosbag2 makes one for each bag."""
+    found = {suffix: sorted(path.glob(f"*{suffix}")) for suffix in (".mcap", ".mcap.zstd", ".db3", ".db3.zstd")}
+    if logs := found[".mcap"]:
+        more = ", ..." if len(logs) > MOST_NAMES else ""
+        return f"a folder, name the log in it: {', '.join(map(str, logs[:MOST_NAMES]))}{more}"
+    if packed := found[".mcap.zstd"]:
+        return f"a folder whose log is compressed as a whole: `zstd -d {packed[0]}` unpacks it"
+    if found[".db3"] or found[".db3.zstd"]:
+        return f"a folder with a bag in SQLite: {TO_MCAP.format(path)}"
+    return "a folder without a log (.mcap)"
+
+
+def what_else(path: Path, head: bytes) -> str:
+    """What a file is by its first bytes, and what to do with it, if it is of a known kind that is not MCAP."""
+    if head.startswith(b"SQLite format 3\0"):
+        return f"a bag in SQLite: {TO_MCAP.format(path.parent)}"
+    if head.startswith(b"#ROSBAG V"):
+        return f"a bag of ROS 1: {TO_MCAP.format(path)}"
+    if b"rosbag2_bagfile_information" in head:
+        return f"the description of a bag, which is {what_folder(path.parent)}"
+    for magic, command in PACKED.items():
+        if head.startswith(magic):
+            return f"compressed as a whole: `{command} {path}` unpacks it"
+    return ""
 
 
 def scan(source: Source, take: Callable[[Content], None]) -> Scan:

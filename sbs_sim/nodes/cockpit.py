@@ -151,7 +151,7 @@ def checked_folder(name: str) -> Path:
         There is no such folder.
     """
     folder = Path(name or os.environ.get("SBS_SIM_BAGS") or "bags")
-    if name and not folder.is_dir():
+    if name and not os.path.isdir(folder):
         raise SbsError(f"--logs {name}: allowed is a folder with logs")
     return folder
 

@@ -7,6 +7,7 @@ import importlib
 import os
 import signal
 import sys
+from collections.abc import Callable
 
 from sbs_sim import command_line
 
@@ -82,7 +83,19 @@ def _run(name: str, interrupted: int = 0) -> None:
     module.main()
 
 
+def when_interrupted(act: Callable[..., object]) -> None:
+    """What to do when somebody wants the end: by Ctrl-C, by `kill`, or by closing the terminal, if that is heeded."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if (number, signal.getsignal(number)) != (signal.SIGHUP, signal.SIG_IGN):  # nohup
+            signal.signal(number, act)
+
+
+def ignore_interruptions() -> None:
+    """Do not let anything disturb the end."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+
+
 def _end_at_once_when_interrupted(code: int = 0) -> None:
     """Until the nodes run there is nothing to be ended in good order: `sbs_sim.nodes.host.run` takes over then."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: os._exit(code))
+    when_interrupted(lambda *_: os._exit(code))

@@ -2,7 +2,6 @@
 
 import array
 import os
-import signal
 import sys
 import threading
 import traceback
@@ -26,6 +25,7 @@ from rclpy.signals import SignalHandlerOptions
 from sbs_sim.aircraft import config_folder
 from sbs_sim.command_line import suggestion
 from sbs_sim.errors import SbsError
+from sbs_sim.nodes.executables import ignore_interruptions, when_interrupted
 
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # What ROS raises where a name, a parameter or a setting of the environment makes a node impossible.
@@ -252,7 +252,7 @@ def run(
     Returns
     -------
     int
-        0 after an interruption (Ctrl-C, SIGTERM) or the end, 1 if the nodes could not start.
+        0 after an interruption (Ctrl-C, SIGTERM, SIGHUP) or the end, 1 if the nodes could not start.
     """
     stop = end or threading.Event()
     try:
@@ -273,8 +273,7 @@ def run(
     threads: list[threading.Thread] = []
     try:
         nodes = make_nodes()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: stop.set())
+        when_interrupted(lambda *_: stop.set())
         threads = [threading.Thread(target=_spin, args=(node, stop), name=node.get_name()) for node in nodes]
         for thread in threads:
             thread.start()
@@ -296,8 +295,7 @@ def run(
         for node in reversed(nodes):
             node.destroy_node()
         rclpy.try_shutdown()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)  # a second one must not tear the end of the interpreter apart
+        ignore_interruptions()  # a second one must not tear the end of the interpreter apart
     return 0
 
 

@@ -110,7 +110,7 @@ def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
     RecordingError
         The default folder cannot be made.
     """
-    if record and not Path(record).is_dir():
+    if record and not os.path.isdir(record):  # which says no to names that no file can have, as Path does not
         return Path(record)
     folder = Path(record or os.environ.get("SBS_SIM_BAGS") or "bags")
     try:
@@ -121,7 +121,7 @@ def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
     safe = re.sub(r"[^\w.-]+", "_", aircraft)[:LONGEST_NAME]
     name = f"{begin:%Y-%m-%d_%H-%M-%S}_{safe}"
     others = (folder / f"{name}_{number}.mcap" for number in itertools.count(2))  # of the same second
-    return next(path for path in itertools.chain([folder / f"{name}.mcap"], others) if not path.exists())
+    return next(path for path in itertools.chain([folder / f"{name}.mcap"], others) if not os.path.lexists(path))
 
 
 def definition_file(package: str, place: str) -> Path:

@@ -8,8 +8,8 @@ import argparse
 import importlib
 import itertools
 import math
+import os
 import re
-import signal
 import sys
 import threading
 import time
@@ -34,8 +34,17 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.command_line import Parser, assignment
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
-from sbs_sim.nodes.executables import INTERRUPTED
-from sbs_sim.nodes.host import DISCOVERY, EVENT_QOS, SERVICE_QOS, STATE_QOS, Component, own_arguments, run
+from sbs_sim.nodes.executables import INTERRUPTED, ignore_interruptions, when_interrupted
+from sbs_sim.nodes.host import (
+    DISCOVERY,
+    EVENT_QOS,
+    ROS_REFUSALS,
+    SERVICE_QOS,
+    STATE_QOS,
+    Component,
+    own_arguments,
+    run,
+)
 from sbs_sim.nodes.recorder import Recorder, definition_file
 from sbs_sim.progress import progress_bar
 from sbs_sim.recording import Log, message_definition, read, recover
@@ -435,7 +444,7 @@ def main(args: list[str] | None = None) -> None:
     try:
         options = _parse(own_arguments(args))
         if options.recover:
-            signal.signal(signal.SIGINT, signal.default_int_handler)  # what is half written is to be taken away
+            when_interrupted(_interrupt)  # what is half written is to be taken away
             sys.exit(_recover(options.file, options.out))
         if options.verify:
             sys.exit(_verify(options.file, options.flight))
@@ -447,6 +456,12 @@ def main(args: list[str] | None = None) -> None:
     except SbsError as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         sys.exit(1)
+
+
+def _interrupt(*_: Any) -> None:
+    """End what is done, once: the end is not to be disturbed."""
+    ignore_interruptions()
+    raise KeyboardInterrupt
 
 
 def make_parser() -> Parser:
@@ -543,8 +558,8 @@ def _replay(options: argparse.Namespace) -> int:
 
 def _recover(path: Path, output: str) -> int:
     """0 if nothing was lost, 3 if something was; a log that cannot be recovered is an error."""
-    target = Path(output) if output else path.with_name(f"{path.stem}{RECOVERED}")
-    if target.is_dir():
+    target = Path(output) if output else path.parent / f"{path.stem}{RECOVERED}"
+    if os.path.isdir(target):  # which says no to names that no file can have
         target /= f"{path.stem}{RECOVERED}"
     with progress_bar("chunk") as progress:
         found = recover(path, target, progress)
@@ -565,7 +580,17 @@ def _tell_if_broken(log: Log) -> None:
 def _verify(path: Path, number: int | None) -> int:
     """0 if every state came again as it should."""
     flight = _flight(path, number)
-    with progress_bar("state") as progress:
+    stop = threading.Event()  # an exception would be lost in the callbacks of the compiler
+    when_interrupted(lambda *_: stop.set())
+
+    with progress_bar("state") as show:
+
+        def progress(done: float, total: float) -> None:
+            if stop.is_set():
+                raise KeyboardInterrupt  # not at once, for the files of the flight are to be taken away
+            if show is not None:
+                show(done, total)
+
         found = verify(flight, progress)
     print(_verdict(found))
     for title, difference in (("first", found.first), ("largest", found.largest)):
@@ -609,7 +634,7 @@ def _fly_with(options: argparse.Namespace) -> int:
         raise RecordingError(f"{log.path} lacks commands after {end:.3f} s: --end {end:.3f} flies those before")
     _tell_if_broken(log)
     stop = threading.Event()  # an exception would be lost in the callbacks of the compiler
-    signal.signal(signal.SIGINT, lambda *_: stop.set())
+    when_interrupted(lambda *_: stop.set())
     with progress_bar("step") as progress:
         path, steps = fly_with(flight, options.changes, last, Path(options.out), stop, progress)
     print(f"{path}: {steps} of {last - first} steps")

@@ -7,6 +7,7 @@ same process.
 
 import math
 import sys
+import threading
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -23,6 +24,7 @@ from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
+from sbs_sim.nodes.executables import when_interrupted
 from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS, Component, Parameter, declare, run
 from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.nodes.recording import Recording
@@ -66,11 +68,11 @@ PARAMETERS = {
 
 
 class Simulator(Component):
-    """See the module. The flight itself begins with `loop.start()`."""
+    """See the module. The flight itself begins with `begin`."""
 
     def __init__(self) -> None:
         super().__init__("simulator")
-        values = declare(self, PARAMETERS)
+        self._values = values = declare(self, PARAMETERS)
         self.components = checked_components(values["components"])
         if "recorder" not in self.components and values["record"] not in ("", OFF):
             raise SbsError(f"parameter record = {values['record']!r}: not allowed without the component recorder")
@@ -78,7 +80,7 @@ class Simulator(Component):
         self._fidelity = {"lead_lag": values["lead_lag"], "cyclic_inflow": values["cyclic_inflow"]}
         simulation = self._start(values)
         self.loop = FlightLoop(simulation, values["real_time_factor"], values["command_timeout"])
-        self.log = self._make_log(simulation, values)
+        self.log = Recording(simulation, self.loop, values) if "recorder" in self.components else None
         self._arrivals = Arrivals(self, SwashplateArray, "swashplate", COMMAND_QOS, self.log)
         self._outputs = Outputs(self, self.loop, self._arrivals, self.log)
         self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
@@ -88,15 +90,18 @@ class Simulator(Component):
         self.create_service(SetWind, "set_wind", self._on_set_wind, qos_profile=SERVICE_QOS)
         self.add_on_set_parameters_callback(self._on_parameters)
 
-    def _make_log(self, simulation: Simulation, values: dict[str, Any]) -> Recording | None:
-        """What records the flight; None if it never will."""
-        if "recorder" not in self.components:
-            return None
-        log = Recording(simulation, self.loop, values)
-        if values["record"] != OFF:
-            log.begin(values["record"])
-            self.get_logger().info(f"recording {log.path}")
-        return log
+    def begin(self) -> None:
+        """Begin the flight, and its log.
+
+        Raises
+        ------
+        RecordingError
+            See `Recording.begin`.
+        """
+        if self.log is not None and self._values["record"] != OFF:
+            self.log.begin(self._values["record"])
+            self.get_logger().info(f"recording {self.log.path}")
+        self.loop.start()
 
     def _start(self, values: dict[str, Any]) -> Simulation:
         """Simulation in trimmed flight at the condition that the parameters name."""
@@ -220,7 +225,7 @@ def checked_components(names: list[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _nodes() -> list[Component]:
+def _nodes(end: threading.Event) -> list[Component]:
     simulator = Simulator()
     nodes: list[Component] = [simulator]
     if "control_mixer" in simulator.components:
@@ -233,10 +238,12 @@ def _nodes() -> list[Component]:
     if simulator.log is not None:
         nodes.append(simulator.log)
     sys.setswitchinterval(TURN)
-    simulator.loop.start()  # last: what is loaded meanwhile would make it miss deadlines
+    when_interrupted(lambda *_: end.set())  # a log that has begun is ended
+    simulator.begin()  # last: what is loaded meanwhile would make it miss deadlines
     return nodes
 
 
 def main(args: list[str] | None = None) -> None:
     """Fly until interrupted."""
-    sys.exit(run(_nodes, args))
+    end = threading.Event()
+    sys.exit(run(lambda: _nodes(end), args, end))

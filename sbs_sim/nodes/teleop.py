@@ -139,7 +139,8 @@ def keys_at_once() -> Iterator[Callable[[], None]]:
     before = termios.tcgetattr(number)
 
     def restore() -> None:
-        termios.tcsetattr(number, termios.TCSADRAIN, before)
+        with contextlib.suppress(termios.error):  # it has been closed
+            termios.tcsetattr(number, termios.TCSADRAIN, before)
 
     def leave(*_: Any) -> None:
         restore()
@@ -156,7 +157,8 @@ def keys_at_once() -> Iterator[Callable[[], None]]:
         yield restore
     finally:
         restore()
-        print(flush=True)
+        with contextlib.suppress(OSError):
+            print(flush=True)
 
 
 def main(args: list[str] | None = None) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -57,7 +58,7 @@ class JoystickFile(ByContent):
         """
         place = checks.path("config", path, PilotError) if path else config_folder() / "joystick.yaml"
         try:
-            if not place.is_file():
+            if not os.path.isfile(place):  # no too for names that no file can have
                 raise PilotError("there is no such file")
             data = config_file.read_yaml(place)
             if found := config_file.problems(data, _validator()):

@@ -48,7 +48,8 @@ from sbs_sim.nodes.host import (
 from sbs_sim.nodes.recorder import Recorder, definition_file
 from sbs_sim.progress import progress_bar
 from sbs_sim.recording import Log, message_definition, read, recover
-from sbs_sim.recording.definitions import parse
+from sbs_sim.recording.cdr import Fit, plain
+from sbs_sim.recording.definitions import parse, short_name
 from sbs_sim.recording.flight import TOLERANCE, Flight, Verification, flight_of, verify, whole_until
 from sbs_sim.recording.playback import Playback
 from sbs_sim.recording.roles import mixed, several
@@ -118,6 +119,8 @@ class Replay(Component):
         self.failure = ""
         if playback.warning:
             self.get_logger().warning(playback.warning)
+        self._left_out: dict[str, int] = {}  # messages that are none of their topic's type
+        self._fits: dict[int, Fit] = {}
         self._outputs = self._make_publishers(topics)
         self._wake = threading.Condition()
         self._paused = self._stopping = False
@@ -150,6 +153,7 @@ class Replay(Component):
                 self.get_logger().warning(f"{channel.topic}: left out, {error}")
             else:
                 first, found[channel.id] = by_topic[channel.topic]
+                self._fits[channel.id] = fit_of(self._playback.schema(channel))
                 if kind is not first:
                     self.get_logger().warning(f"{channel.topic}: partly left out, it was recorded with two types")
                     del found[channel.id]
@@ -174,7 +178,10 @@ class Replay(Component):
             for _ in itertools.count() if self._loop else range(1):
                 begun = time.monotonic()
                 if not self._play_once() or self._wait_until(begun + SHORTEST_PASS) is None:
-                    return
+                    break
+            if self._left_out:
+                listed = ", ".join(f"{count} of {topic}" for topic, count in sorted(self._left_out.items()))
+                self.failure = f"{self._playback.path}: messages that are not of their type were left out: {listed}"
         except SbsError as error:
             self.failure = str(error)
         except Exception as error:  # of ours
@@ -221,12 +228,27 @@ class Replay(Component):
                 return False
             anchor += held
             self._look_out()
-            self._outputs[channel].publish(data)
+            self._publish(channel, (log_time - begin) * 1e-9, data)
             if self._progress is not None:
                 self._progress(min((log_time - begin) * 1e-9, length), length)
         if anchor is None:
             raise RecordingError(f"{self._playback.path}: there is nothing to play in this part or on these topics")
         return True
+
+    def _publish(self, channel: int, time: float, data: bytes) -> None:
+        """Publish a message; what is none is left out, for it would end whoever takes it."""
+        output = self._outputs[channel]
+        try:
+            data = plain(data)
+            self._fits[channel].check(data)
+            output.publish(data)
+        except (RecordingError, *ROS_REFUSALS) as error:
+            topic = output.topic_name
+            if topic not in self._left_out:
+                refused = f"ROS does not publish these {len(data)} bytes"  # it says no more itself
+                why = str(error) if isinstance(error, RecordingError) else refused
+                self.get_logger().warning(f"{topic}: messages are left out, the first at {time:.3f} s: {why}")
+            self._left_out[topic] = self._left_out.get(topic, 0) + 1
 
     def _wait_until(self, due: float) -> float | None:
         """Sleep until a wall time; how long a pause held it up [s], None at the end."""
@@ -275,6 +297,12 @@ def installed_type(channel: Channel, schema: Schema | None) -> Any:
         if any(recorded.get(name) != fields for name, fields in installed.items()):
             raise SbsError(f"{schema.name} is installed with other fields than were recorded")
     return kind
+
+
+def fit_of(schema: Schema | None) -> Fit:
+    """What tells whether messages are of an installed type."""
+    name = "" if schema is None else schema.name
+    return Fit(parse(name, message_definition(name, definition_file)), short_name(name))
 
 
 def _installed(type_name: str) -> Any:

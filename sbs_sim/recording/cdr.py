@@ -11,10 +11,13 @@ values of an empty list and then writes none.
 """
 
 import struct
+from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import zstandard
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 from numpy.typing import NDArray
@@ -26,6 +29,9 @@ Columns = dict[str, NDArray[Any]]
 
 HEAD = 4  # bytes in front of the message
 PADDING = 3  # bytes that may follow it
+MOST_LAYOUTS = 64  # that are kept to compare messages with
+ZSTD = b"\x28\xb5\x2f\xfd"
+LARGEST_MESSAGE = 1 << 28  # bytes of one that was compressed
 
 
 class Layout:
@@ -60,6 +66,18 @@ class Layout:
         self._message(root, "")
         if not 0 <= len(sample) - self._offset <= self._padding:
             raise RecordingError(f"a message of {len(sample)} bytes does not agree with the definition of {root}")
+
+    def fits(self, message: bytes) -> bool:
+        """True if a message has its values at the same places."""
+        return len(message) == len(self._sample) and all(
+            message[place : place + len(constant)] == constant for place, constant in self._marks
+        )
+
+    @cached_property
+    def _marks(self) -> list[tuple[int, bytes]]:
+        """Bytes that are alike in all messages of the layout, with their places."""
+        sizes = ((self._places[name][1], np.dtype(self._places[name][0]).itemsize) for name in self._constants)
+        return [(place, self._sample[place : place + size]) for place, size in sizes]
 
     def decode(self, messages: Sequence[bytes]) -> Columns | None:
         """Values of many messages by flattened names, if all have this layout."""
@@ -158,6 +176,49 @@ class Layout:
         self._offset += -(self._offset - HEAD) % size
 
 
+class Fit:
+    """Whether messages are what their type says, which must be known before they are handed to somebody.
+
+    Parameters
+    ----------
+    definitions, root
+        See `Layout`.
+    """
+
+    def __init__(self, definitions: Definitions, root: str) -> None:
+        self._definitions, self._root = definitions, root
+        self._known: OrderedDict[int, Layout] = OrderedDict()  # by the size of the messages
+        # which cannot be told
+        self._blind = any(field.type == "wstring" for fields in definitions.values() for field in fields)
+
+    def check(self, message: bytes) -> None:
+        """Raise RecordingError if a message is not what it should be."""
+        known = self._known.get(len(message))
+        if self._blind or (known is not None and known.fits(message)):
+            return
+        self._known[len(message)] = Layout(self._definitions, self._root, message)
+        if len(self._known) > MOST_LAYOUTS:
+            self._known.popitem(last=False)
+
+
+def plain(message: bytes) -> bytes:
+    """Message as it was before a recorder compressed it: rosbag2 can do that with each on its own.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be unpacked.
+    """
+    if not message.startswith(ZSTD):  # no CDR begins like that
+        return message
+    try:
+        if zstandard.frame_content_size(message) > LARGEST_MESSAGE:
+            raise RecordingError(f"a compressed message is larger than {LARGEST_MESSAGE} bytes")
+        return zstandard.ZstdDecompressor().decompress(message, max_output_size=LARGEST_MESSAGE)
+    except (zstandard.ZstdError, MemoryError) as error:
+        raise RecordingError(f"a compressed message cannot be unpacked: {' '.join(str(error).split())}") from None
+
+
 def decode(schema: Schema, definitions: Definitions, root: str, messages: Sequence[bytes]) -> Columns:
     """Values of the messages of a topic by flattened names.
 
@@ -183,6 +244,7 @@ def decode(schema: Schema, definitions: Definitions, root: str, messages: Sequen
     """
     if not messages:
         return dict(_empty(definitions, root, ""))
+    messages = [plain(message) for message in messages]
     columns = Layout(definitions, root, messages[0]).decode(messages)
     return decode_one_by_one(schema, definitions, root, messages) if columns is None else columns
 

@@ -5,6 +5,7 @@ import itertools
 import math
 import os
 import random
+import re
 import resource
 import struct
 import subprocess
@@ -17,18 +18,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
+from foreign_logs import merge
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
-from mcap.records import Schema
+from mcap.records import Channel, Schema
+from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 from ruamel.yaml import YAML
 
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording import LogWriter, message_definition, qos_profiles, read, recover
-from sbs_sim.recording.cdr import Layout, decode, decode_one_by_one
+from sbs_sim.recording.cdr import Fit, Layout, decode, decode_one_by_one
 from sbs_sim.recording.definitions import SEQUENCE, Units, fields_of, parse, short_name
-from sbs_sim.recording.mcap_file import NewFile
+from sbs_sim.recording.flight import flight_of
+from sbs_sim.recording.mcap_file import NewFile, metadata_checksum
 from sbs_sim.recording.mcap_log import CHUNK_SIZE
 from sbs_sim.recording.playback import Playback
 from sbs_sim.recording.scan import LARGEST, Source, read_summary, scan
@@ -59,8 +64,8 @@ def new_log(path, **options):
     return LogWriter(path, library="test 1", wall_start=1_700_000_000_123_456_789, **options)
 
 
-def add_number(log, topic="/number"):
-    return log.add_channel(topic, "test_msgs/msg/Number", NUMBER, qos_profiles())
+def add_number(log, topic="/number", **options):
+    return log.add_channel(topic, "test_msgs/msg/Number", NUMBER, qos_profiles(), **options)
 
 
 def wait_until(condition):
@@ -140,7 +145,8 @@ def flight(ros, sbs, hover, tmp_path_factory):
     path = tmp_path_factory.mktemp("flight") / "flight.mcap"
     attachments = {"sbs.yaml": b"mass: 1\n", "empty": b""}
     sent = []
-    with new_log(path, metadata={"aircraft": {"name": "sbs", "städte": "ü"}}, attachments=attachments) as log:
+    metadata = {"aircraft": {"name": "sbs", "städte": "ü"}}
+    with new_log(path, metadata=metadata, attachments=attachments, ros_distro="rolling") as log:
         channels = {
             topic: log.add_channel(topic, name, ros.definition(name), qos_profiles()) for topic, name in TYPES.items()
         }
@@ -312,8 +318,6 @@ def test_mcap_reads_every_message(flight, ros):
 
 
 def test_the_package_that_reads_from_start_to_end_agrees_with_every_checksum(flight):
-    from mcap.stream_reader import StreamReader
-
     path, sent = flight
     with path.open("rb") as file:
         records = list(StreamReader(file, validate_crcs=True).records)
@@ -328,7 +332,7 @@ def test_rosbag2_finds_its_metadata(flight):
     keys = "version storage_identifier duration starting_time message_count topics_with_message_count"
     keys += " compression_format compression_mode relative_file_paths files custom_data ros_distro"
     assert list(bag) == keys.split()
-    assert (bag["version"], bag["storage_identifier"], bag["ros_distro"]) == (9, "mcap", "jazzy")
+    assert (bag["version"], bag["storage_identifier"], bag["ros_distro"]) == (9, "mcap", "rolling")
     assert bag["message_count"] == len(sent)
     assert bag["files"][0]["path"] == bag["relative_file_paths"][0] == path.name
     topics = {item["topic_metadata"]["name"]: item for item in bag["topics_with_message_count"]}
@@ -337,6 +341,42 @@ def test_rosbag2_finds_its_metadata(flight):
     assert profile["deadline"] == {"sec": 9223372036, "nsec": 854775807}
     assert topics["/state"]["message_count"] == TICKS
     assert topics["/never"]["message_count"] == 0
+
+
+def test_what_the_summary_names_stands_before_it(tmp_path):
+    """A topic that came after the last message too; only topics with messages have a number of them."""
+    path = tmp_path / "late.mcap"
+    with new_log(path) as log:
+        first = add_number(log, "/first")
+        log.write(first, 0, number_message(1))
+        wait_until(lambda: log.written == 1)
+        add_number(log, "/late")
+        log.add_channel("/other", "test_msgs/msg/Other", "int8 value", "", type_hash="RIHS01_00", role="other")
+    with path.open("rb") as file:
+        records = list(StreamReader(file, validate_crcs=True).records)
+    names = [type(record).__name__ for record in records]
+    data = records[: names.index("DataEnd")]
+    schemas = [record.id for record in data if isinstance(record, Schema)]
+    topics = [record.topic for record in data if isinstance(record, Channel)]
+    assert (schemas, topics) == ([1, 2], ["/first", "/late", "/other"])
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert {channel.topic for channel in summary.channels.values()} == set(topics)
+    assert summary.statistics.channel_message_counts == {first: 1}
+    assert (summary.statistics.channel_count, summary.statistics.schema_count) == (3, 2)
+    other = next(channel for channel in summary.channels.values() if channel.topic == "/other")
+    assert (other.metadata["topic_type_hash"], other.metadata["role"]) == ("RIHS01_00", "other")
+    assert read(path).topics == ("/first", "/late", "/other")
+    assert read(path).complete
+
+
+def test_a_recovered_file_keeps_the_name_of_the_distribution(tmp_path, flight):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(flight[0].read_bytes()[:-2000])
+    recover(cut, tmp_path / "new.mcap")
+    with (tmp_path / "new.mcap").open("rb") as file:
+        records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    assert YAML(typ="safe").load(records["rosbag2"]["serialized_metadata"])["ros_distro"] == "rolling"
 
 
 # -- reading -----------------------------------------------------------------------------------------
@@ -716,8 +756,236 @@ def test_what_is_no_recording_is_refused_in_one_line(tmp_path, content):
 def test_what_cannot_be_opened_is_refused_in_one_line(tmp_path):
     with pytest.raises(RecordingError, match=r"cannot read .*nothing.mcap: No such file or directory$"):
         read(tmp_path / "nothing.mcap")
-    with pytest.raises(RecordingError, match=r"cannot read .*: Is a directory$"):
+
+
+def bags(folder):
+    """Bags of all kinds that rosbags writes, by name."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    kinds = {name: store.types[f"std_msgs/msg/{name}"] for name in ("String", "Float64")}
+    mode, storage = rosbag2.CompressionMode, rosbag2.StoragePlugin
+    for name, plugin, compression in (
+        ("mcap", storage.MCAP, None),
+        ("sqlite", storage.SQLITE3, None),
+        ("packed", storage.MCAP, mode.FILE),
+        ("packed_sqlite", storage.SQLITE3, mode.FILE),
+        ("each", storage.MCAP, mode.MESSAGE),
+    ):
+        writer = rosbag2.Writer(folder / name, version=9, storage_plugin=plugin)
+        if compression is not None:
+            writer.set_compression(compression, rosbag2.CompressionFormat.ZSTD)
+        with writer:
+            connections = {
+                key: writer.add_connection(f"/{key}", kind.__msgtype__, typestore=store) for key, kind in kinds.items()
+            }
+            for i in range(20):
+                for key, value in (("String", "x" * i), ("Float64", float(i))):
+                    data = store.serialize_cdr(kinds[key](data=value), kinds[key].__msgtype__)
+                    writer.write(connections[key], i * 10_000_000, data)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def all_bags(tmp_path_factory):
+    return bags(tmp_path_factory.mktemp("bags"))
+
+
+CONVERT = (
+    "`rosbags-convert --src {} --dst NEW --dst-storage mcap` of the Python package rosbags makes one in MCAP of it"
+)
+OTHER_KINDS = {
+    "mcap": "a folder, name the log in it: {0}/mcap.mcap",
+    "sqlite": f"a folder with a bag in SQLite: {CONVERT}",
+    "packed": "a folder whose log is compressed as a whole: `zstd -d {0}/packed.mcap.zstd` unpacks it",
+    "packed_sqlite": f"a folder with a bag in SQLite: {CONVERT}",
+    "sqlite/sqlite.db3": f"a bag in SQLite: {CONVERT}",
+    "packed/packed.mcap.zstd": "compressed as a whole: `zstd -d {1}` unpacks it",
+    "mcap/metadata.yaml": "the description of a bag, which is a folder, name the log in it: {0}/mcap.mcap",
+    ".": "a folder without a log (.mcap)",
+}
+
+
+@pytest.mark.parametrize("name", OTHER_KINDS)
+def test_bags_of_other_kinds_are_told_what_to_do_with(all_bags, name):
+    path = all_bags / name
+    folder = path if path.is_dir() else path.parent
+    expected = OTHER_KINDS[name].format(folder, path).replace("--src {}", f"--src {folder}")
+    for use in (read, Playback, lambda path: recover(path, all_bags / "new.mcap")):
+        with pytest.raises(RecordingError) as caught:
+            use(path)
+        assert str(caught.value) == f"cannot read {path}: {expected}"
+    assert not (all_bags / "new.mcap").exists()
+
+
+def test_many_logs_in_a_folder_are_not_all_listed(tmp_path):
+    for i in range(5):
+        (tmp_path / f"{i}.mcap").touch()
+    with pytest.raises(RecordingError, match=r"name the log in it: \S+/0.mcap, \S+/1.mcap, \S+/2.mcap, \.\.\.$"):
         read(tmp_path)
+
+
+def test_messages_that_are_compressed_one_by_one_are_unpacked(all_bags):
+    log = read(all_bags / "each" / "each.mcap")
+    assert log["Float64"]["data"].tolist() == list(range(20))
+    assert log["String"]["data"].tolist() == ["x" * i for i in range(20)]
+
+
+@pytest.mark.parametrize("damage", ["cut", "no end", "too large"])
+def test_a_compressed_message_that_cannot_be_unpacked_is_one_line(tmp_path, damage):
+    data = zstandard.compress(number_message(1))
+    if damage == "too large":  # says that it holds 2^62 bytes
+        data = data[:4] + b"\xe0" + struct.pack("<Q", 2**62) + data[-8:]
+    path = tmp_path / "a.mcap"
+    with new_log(path) as log:
+        log.write(add_number(log), 0, {"cut": data[:6], "no end": data[:-3]}.get(damage, data))
+    with pytest.raises(RecordingError, match=r"^topic /number: a compressed message [^\n]+$"):
+        dict(read(path)["number"])
+
+
+def test_what_is_no_message_of_its_type_is_found_out():
+    fit = Fit(parse("a/msg/B", "float64 value\nstring name\nint16[] numbers"), "a/B")
+    good = struct.pack("<4BdI4sIhh", 0, 1, 0, 0, 1.0, 4, b"abc\0", 2, 3, 4)
+    for message in (good, good, good[:-4] + b"\5\0\6\0", struct.pack("<4BdI2s2xI", 0, 1, 0, 0, 1.0, 2, b"a\0", 0)):
+        fit.check(message)
+    wrong = (good[:-2], good + b"\0\0\0\0", good[:12] + b"\xff\0\0\0" + good[16:], b"", b"\0\1", b"\0\7\0\0" + good[4:])
+    for message in wrong:
+        with pytest.raises(RecordingError):
+            fit.check(message)
+    fit.check(good)
+
+
+# -- whose topics are which --------------------------------------------------------------------------------------
+
+
+ROLES = ("state", "events")
+
+
+def flight_log(path, namespace, value, begin, roles=ROLES):
+    """Log of a flight in a namespace whose every value is the same."""
+    metadata, attachments = {"simulation": {"aircraft": f"craft {value}"}}, {"aircraft.yaml": f"{value}".encode()}
+    with LogWriter(path, library="test", wall_start=begin, metadata=metadata, attachments=attachments) as log:
+        for role in roles:
+            channel = add_number(log, f"{namespace}/{role}", role=role)
+            for i in range(3):
+                log.write(channel, i, number_message(value))
+    return path
+
+
+def test_a_role_finds_its_topic_however_it_is_called(tmp_path):
+    path = tmp_path / "a.mcap"
+    with new_log(path) as log:
+        for topic, role, value in (("/x/y", "state", 1), ("/state", "rotors", 2), ("/d", "a", 3), ("/e", "a", 4)):
+            log.write(add_number(log, topic, role=role), 0, number_message(value))
+    log = read(path)
+    assert [log[name]["value"][0] for name in ("state", "/state", "rotors", "/x/y", "x/y")] == [1, 2, 2, 1, 1]
+    assert log.roles == {"state": "/x/y", "rotors": "/state"}  # the two others cannot be told apart
+    assert log.flights == (log,)
+    assert log.flight() is log
+    assert log.flight(1) is log
+    assert "a" not in log
+    with pytest.raises(RecordingError, match="flight 2: allowed are 1 to 1"):
+        log.flight(2)
+    recover(path, tmp_path / "new.mcap")
+    assert read(tmp_path / "new.mcap").roles == log.roles
+
+
+@pytest.mark.parametrize("names", [("/h1", "/h2"), ("", "")])
+def test_flights_in_one_file_are_told_apart(tmp_path, names):
+    """By their numbers, in the order in which they began; what belongs to none belongs to each."""
+    late = flight_log(tmp_path / "late.mcap", names[0], 2, 2_000_000_000)
+    early = flight_log(tmp_path / "early.mcap", names[1], 1, 1_000_000_000)
+    other = foreign_log(tmp_path / "other.mcap", messages=3)
+    path = merge(tmp_path / "both.mcap", late, early, other)
+    log = read(path)
+    assert [flight["state"]["value"].tolist() for flight in log.flights] == [[1, 1, 1], [2, 2, 2]]
+    assert [flight.metadata["simulation"]["aircraft"] for flight in log.flights] == ["craft 1", "craft 2"]
+    assert [flight.attachments["aircraft.yaml"] for flight in log.flights] == [b"1", b"2"]
+    assert [len(flight["number"].time) for flight in log.flights] == [3, 3]
+    assert log.flight(2) is log.flights[1]
+    both = f"{path} holds 2 flights, choose one by --flight NUMBER (in Python of log.flights): 1 is craft 1 on "
+    for use in (log.flight, lambda: log["state"]):
+        with pytest.raises((RecordingError, KeyError), match=re.escape(both)) as caught:
+            use()
+        assert f"{names[1]}/state begun 1970-01-01T00:00:01.000+00:00; 2 is craft 2 on {names[0]}/state" in str(caught)
+    assert "state" not in log
+    assert len(log[f"{names[0]}/state"].time) == (6 if names[0] == names[1] else 3)  # by its name all that there is
+    assert recover(path, tmp_path / "new.mcap").complete
+    again = read(tmp_path / "new.mcap")
+    assert [flight.attachments["aircraft.yaml"] for flight in again.flights] == [b"1", b"2"]
+    assert [flight["state"]["value"].tolist() for flight in again.flights] == [[1, 1, 1], [2, 2, 2]]
+    for number, flight in enumerate(log.flights, 1):
+        with Playback(path, number) as playback:
+            topics = {channel.topic for channel in playback.channels.values()}
+            assert topics == {*flight.topics, "/number"}
+    with pytest.raises(RecordingError, match="flight 3: allowed are 1 to 2"):
+        Playback(path, 3)
+
+
+def test_a_topic_of_two_types_in_two_flights_is_found_in_each(tmp_path):
+    paths = [tmp_path / "0.mcap", tmp_path / "1.mcap"]
+    for i, path in enumerate(paths):
+        with LogWriter(path, library="test", wall_start=i) as log:
+            text = ("float64 value", "float64 value\nint8 more")[i]
+            channel = log.add_channel("/state", "test_msgs/msg/Number", text, "", role="state")
+            log.write(channel, 0, number_message(i) + bytes(i))
+    log = read(merge(tmp_path / "both.mcap", *paths))
+    assert [flight["state"]["value"].tolist() for flight in log.flights] == [[0], [1]]
+    assert any("/state has another type in another flight" in reason for reason in log.reasons)
+
+
+def test_topics_of_logs_that_do_not_say_what_they_are_are_found_by_type(tmp_path):
+    """Of older versions, or recorded by others: each flight has the topics beside its states, and time is of all."""
+    kinds = {"state": "BodyState", "rotors": "RotorStateArray", "events": "FlightEvent"}
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="other")
+
+        def add(topic, kind):
+            schema = writer.register_schema(kind, "ros2msg", NUMBER.encode())
+            channel = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channel, 0, number_message(0), 0)
+
+        for namespace in ("/a", "/b/c"):
+            for role, kind in kinds.items():
+                add(f"{namespace}/{role}", f"sbs_msgs/msg/{kind}")
+        add("/b/c/odom", "nav_msgs/msg/Odometry")
+        add("/b/c/wheels", "nav_msgs/msg/Odometry")
+        add("/clock", "rosgraph_msgs/msg/Clock")
+        writer.finish()
+    found = [flight.roles for flight in read(path).flights]
+    first = {**{role: f"/a/{role}" for role in kinds}, "clock": "/clock"}
+    assert found == [first, {**{role: f"/b/c/{role}" for role in kinds}, "odom": "/b/c/odom", "clock": "/clock"}]
+
+
+@pytest.mark.parametrize("names", [("/h1", "/h2"), ("", "")])
+def test_older_logs_in_one_file_are_told(tmp_path, names):
+    """They had no identity: whose the metadata are cannot be told, nor what is whose on one topic."""
+    paths = [tmp_path / "0.mcap", tmp_path / "1.mcap"]
+    for i, path in enumerate(paths):
+        start = {"library": "sbs_sim 0", "wall_start_ns": str(i)}
+        with path.open("wb") as file:
+            writer = Writer(file)
+            writer.start(profile="ros2", library="sbs_sim 0")
+            writer.add_metadata("recording", {**start, "crc32": metadata_checksum("recording", start)})
+            schema = writer.register_schema("sbs_msgs/msg/BodyState", "ros2msg", NUMBER.encode())
+            channel = writer.register_channel(f"{names[i]}/state", "cdr", schema)
+            writer.add_message(channel, i, number_message(i), 0)
+            writer.finish()
+    path = merge(tmp_path / "both.mcap", *paths)
+    log = read(path)
+    alike = f"{path} holds 2 flights that cannot be told apart, for their logs had no identity yet"
+    if names[0] == names[1]:
+        with pytest.raises(RecordingError, match=re.escape(alike)):
+            log.flight()
+    else:
+        assert [flight["state"]["value"].tolist() for flight in log.flights] == [[0], [1]]
+        with pytest.raises(RecordingError, match="choose one by --flight"):
+            log.flight()
+    for flight in log.flights:
+        with pytest.raises(RecordingError, match=re.escape(alike)):
+            flight_of(flight)
 
 
 # -- reading to play ---------------------------------------------------------------------------------
@@ -994,6 +1262,65 @@ def test_what_cannot_be_recorded_is_refused(tmp_path):
         with pytest.raises(RecordingError, match=r"metadata '\w+': reserved are recording, "):
             new_log(tmp_path / "other.mcap", metadata=data)
     assert not (tmp_path / "other.mcap").exists()
+
+
+def test_a_log_that_is_deleted_is_told_at_once(tmp_path):
+    """Though nothing is written any more."""
+    log = new_log(tmp_path / "a.mcap")
+    number = add_number(log)
+    log.write(number, 0, number_message(1))
+    wait_until(lambda: log.written == 1)
+    log.path.unlink()
+    begin = time.monotonic()
+    wait_until(lambda: log.failed)
+    assert time.monotonic() - begin < 1.0
+    assert log.failed == f"{tmp_path / 'a.mcap'} was deleted while it was written: what was in it is lost"
+    assert not log.write(number, 1, number_message(2))
+    assert not log.close()
+    assert log.dropped == 1
+
+
+@pytest.mark.parametrize("how", ["replaced", "overwritten", "cut", "its folder deleted"])
+def test_a_log_that_is_replaced_is_told_and_the_other_file_stays(tmp_path, how):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    path, other = folder / "a.mcap", tmp_path / "other"
+    log = new_log(path)
+    add_number(log)
+    if how == "replaced":
+        other.write_bytes(b"other")
+        other.replace(path)
+    elif how == "overwritten":
+        path.write_bytes(b"other")
+    elif how == "cut":
+        os.truncate(path, 20)
+    else:
+        path.unlink()
+        folder.rmdir()
+    assert not log.close()
+    assert log.failed.startswith(f"{path} was ")
+    left = path.read_bytes() if path.exists() else None
+    log.discard()
+    if how == "replaced":
+        assert path.read_bytes() == left == b"other"  # which is none of ours
+
+
+def test_a_log_that_is_moved_is_followed(tmp_path):
+    log = new_log(tmp_path / "a.mcap")
+    number = add_number(log)
+    (tmp_path / "a.mcap").rename(tmp_path / "b.mcap")
+    (tmp_path / "a.mcap").write_bytes(b"other")
+    log.write(number, 0, number_message(1))
+    wait_until(lambda: log.written)
+    assert log.path == tmp_path / "b.mcap"
+    tmp_path.joinpath("c").mkdir()
+    log.path.rename(tmp_path / "c" / "d.mcap")
+    assert log.close()
+    assert log.path == tmp_path / "c" / "d.mcap"
+    assert read(log.path)["number"]["value"].tolist() == [1]
+    log.discard()
+    assert (tmp_path / "a.mcap").read_bytes() == b"other"
+    assert not list(tmp_path.rglob("d.mcap"))
 
 
 def test_an_error_of_ours_ends_the_recording_and_not_the_flight(tmp_path):

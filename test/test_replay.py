@@ -3,13 +3,17 @@
 import itertools
 import math
 import signal
+import struct
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
+from foreign_logs import merge
 
 rclpy = pytest.importorskip("rclpy")
 
@@ -23,6 +27,7 @@ from ros_harness import (  # noqa: E402
     world,
 )
 from rosgraph_msgs.msg import Clock  # noqa: E402
+from std_msgs.msg import Float64, String  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 from terminal import on_a_terminal  # noqa: E402
 
@@ -32,7 +37,10 @@ from sbs_msgs.msg import (  # noqa: E402
     SwashplateArray,
 )
 from sbs_sim import Aircraft, trim  # noqa: E402
+from sbs_sim.errors import RecordingError  # noqa: E402
+from sbs_sim.nodes.replay import fly_with  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
+from sbs_sim.recording.flight import flight_of  # noqa: E402
 from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
 from sbs_sim.versions import compilation_target, differences  # noqa: E402
 
@@ -187,22 +195,26 @@ def test_bad_arguments_are_named(arguments, code, text):
     assert "Traceback" not in found.stderr
 
 
-@pytest.mark.parametrize("seconds", [0.5, 2.0])
-def test_an_interrupted_command_leaves_nothing_and_says_nothing(tmp_path, recorded, seconds):
-    """Whatever it is at; the machine decides what that is."""
+INTERRUPTIONS = [(0.5, signal.SIGINT, signal.SIGTERM), (2.0, signal.SIGHUP, signal.SIGINT)]
+
+
+@pytest.mark.parametrize(("seconds", "first", "second"), INTERRUPTIONS)
+def test_an_interrupted_command_leaves_nothing_and_says_nothing(tmp_path, recorded, seconds, first, second):
+    """Whatever it is at, the machine decides what that is; and whoever is in a hurry."""
     for number, mode in enumerate((["--with", "body.mass=23"], ["--recover"], ["--verify"])):
         output = tmp_path / f"{number}.mcap"
         extra = [] if mode == ["--verify"] else ["--output", str(output)]
         command = [sys.executable, str(EXECUTABLES / "replay"), str(recorded), *mode, *extra]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         time.sleep(seconds)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(first)
+        process.send_signal(second)
         printed, _ = process.communicate(timeout=PATIENCE)
         if process.returncode == 130:
             assert printed == ""
             assert not output.exists()
         else:  # it had ended, or Python itself had only begun
-            assert process.returncode in (0, -signal.SIGINT)
+            assert process.returncode in (0, -first, -second)
 
 
 def test_a_flight_that_did_not_fit_on_the_disk_is_an_error(tmp_path, recorded):
@@ -317,6 +329,96 @@ def test_a_log_of_another_writer_is_played(tmp_path):
     for topic, (*_, why) in left_out.items():
         assert any(f"{topic}: left out" in line and why in line for line in output.splitlines()), output
     assert "Traceback" not in output
+
+
+def test_messages_that_are_none_are_left_out_and_all_others_are_played(tmp_path):
+    """Too short, of lengths that cannot be, or refused by ROS: one line for each topic, and the exit code."""
+    from mcap.writer import Writer
+
+    from sbs_sim.nodes.recorder import definition_file
+    from sbs_sim.recording import message_definition
+
+    def number(i):
+        return struct.pack("<4Bd", 0, 1, 0, 0, i)
+
+    messages = {
+        "/good": ("Float64", number),
+        "/packed": ("Float64", lambda i: zstandard.compress(number(i))),  # as rosbag2 can do with each
+        "/short": ("Float64", lambda i: number(i)[:-1]),
+        "/long": ("Float64", lambda i: number(i) + (b"\0" if i % 2 else b"")),
+        "/text": ("String", lambda i: struct.pack("<4BI", 0, 1, 0, 0, 1000) + b"abc\0"),
+    }
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2", "somebody")
+        for topic, (name, data) in messages.items():
+            kind = f"std_msgs/msg/{name}"
+            schema = writer.register_schema(kind, "ros2msg", message_definition(kind, definition_file).encode())
+            channel = writer.register_channel(topic, "cdr", schema)
+            for i in range(10):
+                writer.add_message(channel, i * 10_000_000, data(i), 0)
+        writer.finish()
+    with world(next(DOMAINS), tmp_path) as made:
+        for topic, (name, _) in messages.items():
+            made.client.watch(topic, {"Float64": Float64, "String": String}[name])
+        found = replay(path, "--delay", 30, domain=made.domain)
+        made.client.until(lambda: len(made.client.messages["/packed"]) == 10, "what is good")
+        received = {topic: [message.data for message in made.client.messages[topic]] for topic in messages}
+    everything = [float(i) for i in range(10)]
+    half = everything[::2]
+    assert received == {"/good": everything, "/packed": everything, "/short": [], "/long": half, "/text": []}
+    assert found.returncode == 1
+    lines = found.stderr.splitlines()
+    assert len(lines) == 4
+    for topic, why in (
+        ("/short", "11 bytes"),
+        ("/long", "ROS does not publish these 13 bytes"),
+        ("/text", "1000 values"),
+    ):
+        (line,) = (line for line in lines if f"{topic}: messages are left out" in line)
+        assert why in line
+    counts = "5 of /long, 10 of /short, 10 of /text"
+    assert lines[-1] == f"{path}: messages that are not of their type were left out: {counts}"
+
+
+def test_two_flights_in_one_file_are_told_and_can_be_chosen(tmp_path, recorded):
+    heavy, both = tmp_path / "heavy.mcap", tmp_path / "both.mcap"
+    fly_with(flight_of(read(recorded)), ["body.mass=23"], 10**6, heavy, threading.Event())
+    merge(both, recorded, heavy)
+    titles = [f"{number} is /state begun {wall}" for number, wall in enumerate(map(begin, (recorded, heavy)), 1)]
+    found = replay(both, domain=next(DOMAINS))
+    assert found.returncode == 1
+    assert found.stderr == (
+        f"{both} holds 2 flights, choose one by --flight NUMBER (in Python of log.flights): {'; '.join(titles)}\n"
+    )
+    refused = replay("--verify", both)
+    assert refused.returncode == 1
+    assert "choose one by --flight" in refused.stderr
+    assert len(refused.stderr.splitlines()) == 1
+    assert replay("--verify", both, "--flight", 2).returncode == 0
+    received, output = play(tmp_path, both, "--flight", 2, "--delay", 30, "--rate", 3)
+    assert "Traceback" not in output
+    heights = [message.position.z for message in received["state"]]
+    assert heights == read(heavy)["state"]["position.z"].tolist()
+    twice = merge(tmp_path / "twice.mcap", recorded, recorded)
+    with pytest.raises(RecordingError, match=r"twice.mcap has 2 starts of a flight on /events"):
+        flight_of(read(twice))
+
+
+def begin(path):
+    return read(path).metadata["recording"]["wall_start"]
+
+
+def test_names_that_no_file_can_have_are_one_line(tmp_path):
+    name = "a" * 300
+    for mode in (["--recover"], ["--with", "body.mass=23", "--end", "0.05"]):
+        found = replay(*mode, HOVER_STEP, "--output", tmp_path / name)
+        assert found.returncode == 1
+        assert found.stderr == f"cannot write {tmp_path / name}: File name too long\n"
+    found = replay("--recover", name)
+    assert found.returncode == 1
+    assert found.stderr == f"cannot read {name}: File name too long\n"
 
 
 def test_a_loop_over_an_instant_is_no_flood(tmp_path, recorded):

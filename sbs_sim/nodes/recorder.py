@@ -98,8 +98,7 @@ class Recorder:
 
     def discard(self) -> None:
         """End the file and delete it."""
-        self.close()
-        self.path.unlink(missing_ok=True)
+        self._writer.discard(CLOSING_TIME)
 
 
 def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:

@@ -129,17 +129,19 @@ class Recording(Component):
 
     def _on_record(self, request: Record.Request, response: Record.Response) -> Record.Response:
         response.path = "" if request.record else self.path
-        self.answer(response, lambda: self._act(request), "")
+        self.answer(response, lambda: self._act(request, response), "")
         if response.success:
-            response.path = response.path or self.path
             response.message = f"recording {response.path}" if request.record else f"recorded {response.path}"
         return response
 
-    def _act(self, request: Record.Request) -> None:
+    def _act(self, request: Record.Request, response: Record.Response) -> None:
         if not request.record:
             if request.path:
                 raise RecordingError(f"path = {checks.shown(request.path)}: allowed where a log begins, record = true")
-            if not self.end():
+            if self._log is not None:
+                self._has_begun.wait(START_PATIENCE)  # a log without its start would be of no use
+            response.path = self.end()
+            if not response.path:
                 raise RecordingError("record = false: nothing is recorded")
             return
         self.begin(request.path, start=self._awaited + 1)
@@ -147,6 +149,7 @@ class Recording(Component):
             self._loop.begin_log()
             if not self._has_begun.wait(START_PATIENCE):
                 raise RecordingError(f"the flight has not handed out its start within {START_PATIENCE:g} s")
+            response.path = self.path
         except SbsError:
             self._open = False
             log, self._log = self._log, None

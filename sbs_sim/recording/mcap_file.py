@@ -250,6 +250,11 @@ class NewFile:
     path : Path
         Must not exist.
 
+    Attributes
+    ----------
+    path : Path
+        Where the file is, as far as is known, see `look`.
+
     Raises
     ------
     RecordingError
@@ -265,6 +270,8 @@ class NewFile:
             raise RecordingError(f"cannot write {path}: the folder {path.parent} does not exist") from None
         except (OSError, ValueError) as error:  # the latter for names that no file can have
             raise RecordingError(f"cannot write {path}: {reason(error)}") from None
+        own = os.fstat(self._descriptor)
+        self._identity = own.st_dev, own.st_ino
 
     def write(self, data: bytes) -> None:
         """Hand all of it to the operating system; what was handed over survives the end of the process, however."""
@@ -278,6 +285,37 @@ class NewFile:
             raise RecordingError(f"cannot write {self.path}: {reason(error)}") from None
         self._size += len(data)
 
+    def look(self) -> None:
+        """Follow a file that was given another name.
+
+        Raises
+        ------
+        RecordingError
+            It was deleted, or somebody else has written into it: what is written from now on would be lost.
+        """
+        if not self._is_at(self.path):
+            self.path = self._other_place()
+        if os.fstat(self._descriptor).st_size != self._size:
+            raise RecordingError(f"{self.path} was overwritten by somebody else while it was written")
+
+    def _other_place(self) -> Path:
+        """Where the file is now, if it is anywhere and the system tells (Linux)."""
+        with contextlib.suppress(OSError):
+            place = Path(os.readlink(f"/proc/self/fd/{self._descriptor}"))
+            if os.fstat(self._descriptor).st_nlink and self._is_at(place):
+                return place
+        raise RecordingError(f"{self.path} was deleted while it was written: what was in it is lost")
+
+    def _is_at(self, path: Path) -> bool:
+        """True if a path leads to this file; where nobody may look it is believed to."""
+        try:
+            found = os.stat(path)
+        except (FileNotFoundError, NotADirectoryError):
+            return False
+        except OSError:
+            return True
+        return (found.st_dev, found.st_ino) == self._identity
+
     def close(self) -> None:
         """Close it; more than once does no harm."""
         descriptor, self._descriptor = self._descriptor, -1
@@ -288,11 +326,12 @@ class NewFile:
             raise RecordingError(f"cannot write {self.path}: {reason(error)}") from None
 
     def discard(self) -> None:
-        """Close and delete it."""
+        """Close and delete it; what somebody else has put in its place stays."""
         with contextlib.suppress(RecordingError):
             self.close()
         with contextlib.suppress(OSError):
-            self.path.unlink()
+            if self._is_at(self.path):
+                self.path.unlink()
 
 
 def reason(error: Exception) -> str:

@@ -2,7 +2,8 @@
 
 Every FLUSH_PERIOD of wall time what has come since is compressed into a chunk and handed to the operating system, so
 that the end of the process, by whatever signal, costs no more than that. (A power failure may cost what the operating
-system had not yet brought to the disk: some 30 s with the usual settings of Linux.)
+system had not yet brought to the disk: some 30 s with the usual settings of Linux.) It is also looked then whether the
+file is still there.
 """
 
 import contextlib
@@ -260,6 +261,11 @@ class LogWriter:
             self.failed = f"cannot write {self.path}: the disk did not take the rest within {timeout:g} s"
         return not self.failed
 
+    def discard(self, timeout: float = 10.0) -> None:
+        """End the recording and delete it."""
+        self.close(timeout)
+        self._file.discard()
+
     def __enter__(self) -> "LogWriter":
         return self
 
@@ -272,7 +278,8 @@ class LogWriter:
 
     def _run(self) -> None:
         try:
-            while batch := self._next_batch():
+            while (batch := self._next_batch()) is not None:
+                self._file.look()
                 for part in _parts(batch):
                     self._file.write(self._builder.chunk(part))
                     self._in_hand -= len(part)
@@ -280,19 +287,20 @@ class LogWriter:
             counts = {"written": str(self.written), "dropped": str(self.dropped)}
             end = self._metadata(END, counts)
             self._file.write(end + self._builder.finish(self.path.name, counts, self._distro))
+            self._file.look()
             self._file.close()
         except RecordingError as error:
             self._fail(str(error))
         except Exception as error:  # an error of ours must not end the flight, nor go unnoticed
             self._fail(f"cannot write {self.path}: internal error: {error!r}")
 
-    def _next_batch(self) -> list[Message]:
-        """What has come since the last call, when a chunk is due; nothing when there will be no more."""
+    def _next_batch(self) -> list[Message] | None:
+        """What has come since the last call, when a chunk is due, or nothing; None when there will be no more."""
         with self._lock:
-            batch: list[Message] = []
-            while not batch and not (self._closing and not self._queue):
-                self._work.wait_for(self._in_haste, FLUSH_PERIOD)
-                batch, self._queue, self._queued_bytes = self._queue, [], 0
+            if self._closing and not self._queue:
+                return None
+            self._work.wait_for(self._in_haste, FLUSH_PERIOD)
+            batch, self._queue, self._queued_bytes = self._queue, [], 0
             self._in_hand = len(batch)
             self._room.notify_all()
             return batch

@@ -44,6 +44,8 @@ class Report:
     Attributes
     ----------
     snapshot : Snapshot or None
+    repeated : bool
+        The snapshot has been handed out before, and comes again for a log that begins.
     playing : bool
     step : int
         Integration steps since the start.
@@ -73,6 +75,7 @@ class Report:
     fault: str
     command_timed_out: bool
     events: tuple[Event, ...] = ()
+    repeated: bool = False
 
 
 class FlightLoop:
@@ -302,15 +305,15 @@ class FlightLoop:
 
     def _tick(self) -> None:
         """One tick, with its deadline looked after."""
-        self._fly()
+        moved = self._fly()
         self._ticks_due += 1
         if time.monotonic() > self._deadline:
             self._missed += 1
-        self._report(patient=self._as_fast_as_read)
+        self._report(moved, patient=self._as_fast_as_read)
 
-    def _fly(self) -> None:
-        """Take the newest command and fly one tick; a fault pauses."""
-        simulation = self._simulation
+    def _fly(self) -> bool:
+        """Take the newest command and fly one tick; false if a fault came before its first step. A fault pauses."""
+        simulation, before = self._simulation, self._simulation.step
         with contextlib.suppress(IndexError):  # there is none
             simulation.swashplate = self._commands.pop()  # checked when it came
             self._command_time = simulation.time
@@ -320,13 +323,13 @@ class FlightLoop:
         except SbsError as error:
             self._fault = str(error)
             self._playing = False
+        return simulation.step > before
 
     def _single_tick(self) -> float:
         if self._playing:
             raise SimulationError("the simulation is playing: step is allowed while it is paused")
         self._check_fault()
-        self._fly()
-        self._report(patient=True)
+        self._report(self._fly(), patient=True)
         self._check_fault()
         return self._simulation.time
 
@@ -361,13 +364,13 @@ class FlightLoop:
 
     def _begin_log(self) -> None:
         self._events.append(self._simulation.beginning())
-        self._report(patient=self._as_fast_as_read)
+        self._report(repeated=True, patient=self._as_fast_as_read)
 
     @property
     def _as_fast_as_read(self) -> bool:
         return self._pace == 0.0
 
-    def _report(self, with_snapshot: bool = True, patient: bool = False) -> None:
+    def _report(self, with_snapshot: bool = True, patient: bool = False, repeated: bool = False) -> None:
         """Hand out the present state; a patient report waits for its reader, another is dropped if there is none."""
         simulation = self._simulation
         age = 0.0 if self._command_time is None else simulation.time - self._command_time
@@ -382,6 +385,7 @@ class FlightLoop:
             fault=self._fault,
             command_timed_out=self._timeout > 0.0 and age > self._timeout + 1e-9,
             events=tuple(self._events),
+            repeated=repeated,
         )
         while True:
             try:

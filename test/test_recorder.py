@@ -6,10 +6,15 @@ import os
 import signal
 import subprocess
 import sys
+import textwrap
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from ruamel.yaml import YAML
 
 rclpy = pytest.importorskip("rclpy")
 
@@ -17,9 +22,11 @@ from geometry_msgs.msg import Point, Vector3  # noqa: E402
 from recorded_flights import HOVER_STEP, STATE_TOPICS, assert_identical, fly, replay, wiggle  # noqa: E402
 from ros_harness import (  # noqa: E402
     DOMAINS,
+    controls_message,
     swashplate_message,
     world,
 )
+from rosgraph_msgs.msg import Clock  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 
 from sbs_msgs.msg import (  # noqa: E402
@@ -31,8 +38,11 @@ from sbs_msgs.msg import (  # noqa: E402
 )
 from sbs_msgs.srv import Record, Reset, SetWind, Step, Trim  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
+from sbs_sim.cockpit.playback import Recording as Flown  # noqa: E402
+from sbs_sim.nodes.replay import fly_with  # noqa: E402
 from sbs_sim.recording import read, recover  # noqa: E402
 from sbs_sim.recording.flight import flight_of, verify, whole_until  # noqa: E402
+from sbs_sim.recording.plot import flight_figure  # noqa: E402
 from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
 
 # -- what is recorded ------------------------------------------------------------------------------------------------
@@ -94,6 +104,49 @@ def test_another_reader_reads_every_message(tmp_path, hover):
     np.testing.assert_array_equal(heights, log["state"]["position.z"])
 
 
+def test_a_flight_of_other_topics_is_recorded_like_any(tmp_path, hover):
+    """In a namespace, and with topics that are called otherwise: all tools find them by their role."""
+    path, heavy = tmp_path / "a.mcap", tmp_path / "heavy.mcap"
+    with world(next(DOMAINS), tmp_path) as made:
+        client = made.client
+        client.watch("/h1/status", SimulationStatus)
+        remaps = ["__ns:=/h1", "state:=body/pose", "events:=/ev", "inflow:=air", "rotors:=state"]
+        simulator = made.start("simulator", remaps, record=path, components="[simulator, control_mixer, recorder]")
+        client.next("/h1/status")
+        for i in range(10):
+            client.publish("/h1/controls", Controls(collective=hover.controls[0] + 0.001 * i))
+            client.spin(0.02)
+        (sender,) = client.node.get_publishers_info_by_topic("/h1/body/pose")
+        assert simulator.interrupt() == 0, simulator.output
+    log = read(path)
+    names = {"state": "/h1/body/pose", "events": "/ev", "inflow": "/h1/air", "rotors": "/h1/state"}
+    assert names.items() <= log.roles.items()
+    assert log["state"].type == "sbs_msgs/msg/BodyState"
+    assert "rotors[0].flap" in log["rotors"]
+    assert len(log["controls"].time) > 5
+    assert_identical(path)
+    labels = [axes.get_ylabel() for axes in flight_figure(log).axes]
+    assert len(labels) == 10
+    assert Flown(path).end == pytest.approx(log["state"].time[-1])  # as the cockpit shows it
+    found = replay("--with", "body.mass=23", "--output", heavy, path)
+    assert found.returncode == 0, found.stderr
+    assert names.items() <= read(heavy).roles.items()
+    assert_identical(heavy)
+
+    with path.open("rb") as file:  # what other readers learn of the types
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        (bag,) = (record.metadata for record in reader.iter_metadata() if record.name == "rosbag2")
+    channels = {channel.topic: channel.metadata for channel in summary.channels.values()}
+    version, digest = sender.topic_type_hash.version, bytes(sender.topic_type_hash.value).hex()
+    assert channels["/h1/body/pose"]["topic_type_hash"] == f"RIHS{version:02}_{digest}"
+    assert all(metadata["topic_type_hash"].startswith("RIHS01_") for metadata in channels.values())
+    bag = YAML(typ="safe").load(bag["serialized_metadata"])
+    assert bag["ros_distro"] == os.environ.get("ROS_DISTRO", "jazzy")
+    hashes = {item["topic_metadata"]["name"]: item["topic_metadata"] for item in bag["topics_with_message_count"]}
+    assert hashes["/h1/body/pose"]["type_description_hash"] == channels["/h1/body/pose"]["topic_type_hash"]
+
+
 def test_default_is_a_file_named_after_time_and_aircraft(tmp_path):
     with world(next(DOMAINS), tmp_path) as made:
         statuses = made.client.watch("status", SimulationStatus)
@@ -119,9 +172,9 @@ def test_recording_can_be_switched_off(tmp_path):
         assert statuses[-1].log == ""
 
 
-@pytest.mark.parametrize("case", ["exists", "no folder"])
+@pytest.mark.parametrize("case", ["exists", "no folder", "name too long"])
 def test_a_log_that_cannot_be_made_ends_the_start_with_one_line(tmp_path, case):
-    path = tmp_path / "a.mcap" if case == "exists" else tmp_path / "none" / "a.mcap"
+    path = tmp_path / {"exists": "a.mcap", "no folder": "none/a.mcap"}.get(case, "a" * 300)
     if case == "exists":
         path.write_bytes(b"")
     with world(next(DOMAINS), tmp_path) as made:
@@ -160,6 +213,88 @@ def test_a_disk_that_is_full_at_the_very_end_is_told(tmp_path):
         resource.prlimit(simulator.pid, resource.RLIMIT_FSIZE, (size, size))
         assert simulator.interrupt() == 0
     assert f"the log ends before the flight: cannot write {tmp_path / 'a.mcap'}: File too large" in simulator.output
+
+
+def test_a_log_that_is_deleted_or_moved_is_told(tmp_path, hover):
+    """Also while the flight is paused, when nothing but the heartbeat is published, and nothing new is recorded."""
+    first, second, moved = (tmp_path / f"{name}.mcap" for name in ("first", "second", "moved"))
+    with world(next(DOMAINS), tmp_path) as made:
+        client = made.client
+        statuses = client.watch("status", SimulationStatus)
+        clocks = client.watch("/clock", Clock)
+        simulator = made.start("simulator", record=first)
+        client.next("status")
+        wiggle(made, hover, 0.2)
+        assert client.call(SetBool, "pause", data=True).success
+        for _ in range(10):
+            client.publish("controls", controls_message(hover.controls))
+            client.spin(0.02)
+        client.spin(2.5)  # until all that is news is written, of the diagnostics too
+        beats, ticks, size = len(statuses), len(clocks), first.stat().st_size
+        begin = time.monotonic()
+        while len(clocks) < ticks + 4:
+            client.publish("controls", controls_message(hover.controls))
+            client.spin(0.02)
+        seconds = time.monotonic() - begin
+        assert len(statuses) - beats < 2 * seconds  # ten a second before
+        assert {status.sim_time for status in statuses[beats:]} == {statuses[-1].sim_time}
+        assert first.stat().st_size == size
+
+        first.unlink()
+        fault = f"{first} was deleted while it was written: what was in it is lost"
+        assert client.next("status", lambda status: status.log_fault).log_fault == fault
+        answer = client.call(Record, "record", record=False)
+        assert (answer.success, answer.path) == (False, str(first))
+        assert answer.message == f"the log ends before the flight: {fault}"
+
+        assert client.call(Record, "record", record=True, path=str(second)).success
+        second.rename(moved)
+        client.next("status", lambda status: status.log == str(moved))
+        assert client.call(SetBool, "pause", data=False).success
+        wiggle(made, hover, 0.3)
+        answer = client.call(Record, "record", record=False)
+        assert (answer.success, answer.path) == (True, str(moved)), answer.message
+        assert simulator.interrupt() == 0, simulator.output
+    assert f"the log ends before the flight: {fault}" in simulator.output
+    assert_identical(moved)
+
+
+@pytest.mark.parametrize("signals", [[signal.SIGHUP], [signal.SIGINT, signal.SIGTERM]])
+def test_a_log_is_whole_however_the_end_is_asked_for(tmp_path, signals):
+    """A terminal that is closed; somebody who is in a hurry."""
+    with world(next(DOMAINS), tmp_path) as made:
+        made.client.watch("state", BodyState)
+        simulator = made.start("simulator", record=tmp_path / "a.mcap", components="[simulator, recorder]")
+        made.client.next("state")
+        for number in signals:
+            os.kill(simulator.pid, number)
+        assert simulator.wait() == 0, simulator.output
+    assert read(tmp_path / "a.mcap").complete
+    assert "Traceback" not in simulator.output
+
+
+def test_a_log_that_has_just_begun_is_whole(tmp_path):
+    """Interrupted while all the rest is made: there is a whole log, or none yet."""
+    path = tmp_path / "a.mcap"
+    with world(next(DOMAINS), tmp_path) as made:
+        simulator = made.start("simulator", record=path)
+        made.client.until(path.exists, "the log")
+        assert simulator.interrupt(signal.SIGTERM) == 0
+    assert read(path).complete
+    assert "Traceback" not in simulator.output
+
+
+def test_who_does_not_heed_a_closed_terminal_is_left_alone():
+    code = """
+        import signal
+        from sbs_sim.nodes.executables import when_interrupted
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+        when_interrupted(print)
+        print(signal.getsignal(signal.SIGHUP) == signal.SIG_IGN, signal.getsignal(signal.SIGTERM) == print)
+    """
+    command = [sys.executable, "-c", textwrap.dedent(code)]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert found.stdout == "True True\n"
 
 
 def test_an_interruption_in_a_long_computation_leaves_a_whole_log(tmp_path):
@@ -323,6 +458,8 @@ def test_a_log_begun_in_mid_flight_flies_with_a_changed_aircraft(tmp_path, hover
         made.client.watch("status", SimulationStatus)
         made.start("simulator", record="off")
         made.client.next("status", lambda status: status.sim_time > 0.3)
+        assert made.client.call(SetWind, "set_wind", velocity=Vector3(x=1.0)).success
+        made.client.next("status", lambda status: status.sim_time > 0.5)
         assert made.client.call(Record, "record", record=True, path=str(path)).success
         wiggle(made, hover, 0.5)
         assert made.client.call(Record, "record", record=False).success
@@ -333,6 +470,14 @@ def test_a_log_begun_in_mid_flight_flies_with_a_changed_aircraft(tmp_path, hover
     assert log["state"].time[0] == begin
     assert log["state"].time[-1] == pytest.approx(begin + 0.3, abs=0.011)
     assert_identical(heavy)
+
+    # rotors that turn more slowly take fewer steps to a tick, and the wind is older than the log
+    flight, slow = flight_of(read(path)), tmp_path / "slow.mcap"
+    changes = [f"rotors[{j}].speed_rpm=1800" for j in (0, 1)]
+    fly_with(flight, changes, int(flight.steps[-1]), slow, threading.Event())
+    wind = [read(found)["events"]["wind_step"][0] for found in (path, slow)]
+    assert wind[1] * 29 == wind[0] * 22
+    assert_identical(slow)
 
 
 def test_what_cannot_be_recorded_is_refused_in_one_line_and_changes_nothing(tmp_path):
@@ -355,6 +500,7 @@ def test_what_cannot_be_recorded_is_refused_in_one_line_and_changes_nothing(tmp_
         assert (tmp_path / "there.mcap").read_bytes() == b"mine"
         assert "does not exist" in refusal(record=True, path=str(tmp_path / "none" / "a.mcap"))
         assert "Permission denied" in refusal(record=True, path="/sys/a.mcap")
+        assert "File name too long" in refusal(record=True, path="a" * 300)
         answer = client.call(Record, "record", record=True, path=str(tmp_path))  # a folder
         assert answer.success
         assert Path(answer.path).parent == tmp_path

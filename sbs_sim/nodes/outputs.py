@@ -1,6 +1,9 @@
 """What the simulator publishes: a thread that turns the reports of a flight into messages."""
 
+import contextlib
+import math
 import threading
+import time
 from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -17,6 +20,7 @@ from sbs_sim.nodes.conversions import StateMessages, event_message, fill_working
 from sbs_sim.nodes.host import COMPLAINT_PERIOD, EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Topic, diagnostic
 from sbs_sim.simulation import Event
 
+HEARTBEAT = 1.0  # s of wall time between status and /clock of a flight at rest
 PUBLISHING_TIME = 10.0  # s for what is still to be published at the end
 
 if TYPE_CHECKING:
@@ -44,11 +48,15 @@ class Outputs:
         self._messages = StateMessages(loop.aircraft)
         self._clock_message, self._status = Clock(), SimulationStatus()
         self._last_report: Report | None = None
-        self._told: list[str] = []
-        self._state = Topic(node, BodyState, "state", STATE_QOS, log)
-        self._rotors = Topic(node, RotorStateArray, "rotors", STATE_QOS, log)
-        self._inflow = Topic(node, InflowArray, "inflow", STATE_QOS, log)
-        self._odom = Topic(node, Odometry, "odom", STATE_QOS, log)
+        self._warned: list[str] = []
+        self._told: tuple[Any, ...] = ()  # what may be new though the aircraft has not moved
+        self._told_at = -math.inf
+        self._of_snapshots = (
+            (Topic(node, BodyState, "state", STATE_QOS, log), self._messages.state),
+            (Topic(node, RotorStateArray, "rotors", STATE_QOS, log), self._messages.rotors),
+            (Topic(node, InflowArray, "inflow", STATE_QOS, log), self._messages.inflow),
+            (Topic(node, Odometry, "odom", STATE_QOS, log), self._messages.odom),
+        )
         self._clock = Topic(node, Clock, "/clock", STATE_QOS, log)
         self._events = Topic(node, FlightEvent, "events", EVENT_QOS, log)
         self._status_topic = Topic(node, SimulationStatus, "status", STATE_QOS, log)
@@ -66,22 +74,24 @@ class Outputs:
         while (report := self._loop.reports.get()) is not None:
             self._say_changes(report)
             self._last_report = report
-            # where nothing hurries the flight, the log may hold it up rather than miss something
-            now, wait = report.time, self._loop.pace == 0.0
-            stamp = to_time(now)
-            self._clock_message.clock = stamp
-            self._clock.publish(self._clock_message, now, wait)
-            for event in report.events:
-                self._tell_event(event, now, wait)
-            if report.snapshot is not None:
-                self._messages.fill(report.snapshot)
-                self._state.publish(self._messages.state, now, wait)
-                self._rotors.publish(self._messages.rotors, now, wait)
-                self._inflow.publish(self._messages.inflow, now, wait)
-                self._odom.publish(self._messages.odom, now, wait)
-            self._publish_status(report, stamp, wait)
-            if self._log is not None:
-                self._log.end_instant()
+            self._fill_status(report)
+            if self._is_due(report):
+                with contextlib.nullcontext() if self._log is None else self._log.instant():
+                    self._publish(report)
+
+    def _publish(self, report: Report) -> None:
+        """Publish and record all that a report tells."""
+        # where nothing hurries the flight, the log may hold it up rather than miss something
+        now, wait = report.time, self._loop.pace == 0.0
+        self._clock_message.clock = to_time(now)
+        self._clock.publish(self._clock_message, now, wait)
+        for event in report.events:
+            self._tell_event(event, now, wait)
+        if report.snapshot is not None:
+            self._messages.fill(report.snapshot)
+            for topic, message in self._of_snapshots:
+                (topic.record if report.repeated else topic.publish)(message, now, wait)
+        self._status_topic.publish(self._status, now, wait)
 
     def _tell_event(self, event: Event, now: float, wait: bool) -> None:
         """Publish and record an event: no flight can be flown again without it."""
@@ -95,9 +105,20 @@ class Outputs:
             self._events.publish(message, now, wait, essential=True)
         self._begun = True
 
-    def _publish_status(self, report: Report, stamp: Any, wait: bool) -> None:
+    def _is_due(self, report: Report) -> bool:
+        """True if a report has news, or others must be told again that all goes on, and what time it is."""
+        now, status = time.monotonic(), self._status
+        counts = status.missed_deadlines, status.dropped_messages, status.rejected_messages, status.log_dropped
+        told = (report.playing, report.step, counts, status.fault, status.log, status.log_fault)
+        moved = report.snapshot is not None or bool(report.events)
+        if not moved and told == self._told and now < self._told_at + HEARTBEAT:
+            return False
+        self._told, self._told_at = told, now
+        return True
+
+    def _fill_status(self, report: Report) -> None:
         status = self._status
-        status.header.stamp = stamp
+        status.header.stamp = to_time(report.time)
         status.state = SimulationStatus.PLAYING if report.playing else SimulationStatus.PAUSED
         status.sim_time = report.time
         status.real_time_factor = report.real_time_factor
@@ -110,7 +131,6 @@ class Outputs:
             fill_working_states(status, self._loop.aircraft, report.snapshot)
         if self._log is not None:
             status.log, status.log_dropped, status.log_fault = self._log.path, self._log.dropped, self._log.fault
-        self._status_topic.publish(status, report.time, wait)
 
     def _say_changes(self, report: Report) -> None:
         """One log line when a fault, a time-out or a departure from what the model describes begins."""
@@ -122,9 +142,9 @@ class Outputs:
             log.warning(f"no command for {self._loop.command_timeout:g} s: holding the last one")
 
         for line in self._status.warnings:
-            if line not in self._told:
+            if line not in self._warned:
                 log.warning(f"outside the model's validity: {line}", throttle_duration_sec=COMPLAINT_PERIOD)
-        self._told = list(self._status.warnings)
+        self._warned = list(self._status.warnings)
 
     def say_log_fault(self) -> None:
         """One log line when the recording has failed."""

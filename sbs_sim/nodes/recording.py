@@ -4,10 +4,13 @@ Serves `record`, which begins and ends logs while the simulator flies. The nodes
 publish or accept through it, at any time; where no log is open, that costs nothing.
 """
 
+import contextlib
 import threading
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
 
 from sbs_msgs.srv import Record
 from sbs_sim import checks
@@ -19,6 +22,8 @@ from sbs_sim.simulation import Simulation
 if TYPE_CHECKING:
     from sbs_sim.nodes.recorder import Recorder
 
+STATES = ("state", "rotors", "inflow", "odom")  # are written together, and read together by their numbers
+INSTANT_PATIENCE = 1.0  # s until an instant is written: a disk that takes nothing must not hold up the end
 START_PATIENCE = 10.0  # s until a start that was asked for is written
 
 
@@ -45,7 +50,9 @@ class Recording(Component):
         self._handed_out, self._awaited = 0, 0
         self._open = False  # the start of the flight is in the log
         self._has_begun = threading.Event()  # and all of that instant
+        self._instant = threading.Lock()
         self._channels: list[int] = []  # of the log, by our own numbers
+        self._latest: dict[int, tuple[float, bytes]] = {}  # what was written last, by the same
         self.create_service(Record, "record", self._on_record, qos_profile=SERVICE_QOS)
 
     # ------------------------------------------------------------------------------------- what the nodes write into
@@ -59,10 +66,24 @@ class Recording(Component):
             return len(self._topics) - 1
 
     def write(self, channel: int, time: float, data: bytes, wait: bool = False, essential: bool = False) -> None:
-        """Record a serialised message of a simulation time [s], see `LogWriter.write`; nothing without a log."""
+        """Record a serialised message of a simulation time [s], see `LogWriter.write`; nothing without a log.
+
+        What a flight at rest says or is told again and again is recorded once: time stands still, and there is no news.
+        """
         log, channels = self._log, self._channels
-        if self._open and log is not None:
+        if not self._open or log is None:
+            return
+        if essential or self._topics[channel][3] in STATES or not self._repeats(channel, time, data):
+            self._latest[channel] = time, data
             log.write(channels[channel], time, data, wait, essential)
+
+    def _repeats(self, channel: int, time: float, data: bytes) -> bool:
+        """True if a message says what the last one of the channel has said, at the same time."""
+        then, before = self._latest.get(channel, (-1.0, b""))
+        if time != then or len(data) != len(before):
+            return False
+        kind = self._topics[channel][1]  # by its values, for what stands between them is left to chance
+        return data == before or bool(deserialize_message(data, kind) == deserialize_message(before, kind))
 
     def take_start(self) -> None:
         """From now on what is written gets into the log, if this is the start of the flight that it waits for."""
@@ -70,10 +91,13 @@ class Recording(Component):
             self._open = self._log is not None
         self._handed_out += 1
 
-    def end_instant(self) -> None:
-        """All that belongs to an instant of the flight has been written."""
-        if self._open:
-            self._has_begun.set()
+    @contextlib.contextmanager
+    def instant(self) -> Iterator[None]:
+        """While all that belongs to an instant of the flight is written: a log does not end in the middle of it."""
+        with self._instant:
+            yield
+            if self._open:
+                self._has_begun.set()
 
     @property
     def path(self) -> str:
@@ -106,7 +130,12 @@ class Recording(Component):
             raise RecordingError(f"recording {self.path} already: record = false ends it")
         log = Recorder(record, self._simulation, self._parameters)
         with self._lock:
-            self._channels = [log.channel(*topic) for topic in self._topics]
+            try:
+                self._channels = [log.channel(*topic) for topic in self._topics]
+            except SbsError:
+                log.discard()
+                raise
+            self._latest = {}
             self._awaited, self._log = start, log
             self._has_begun.clear()
 
@@ -118,9 +147,13 @@ class Recording(Component):
         RecordingError
             It is not whole.
         """
-        log, self._open = self._log, False
+        log = self._log
         if log is None:
             return ""
+        whole = self._instant.acquire(timeout=INSTANT_PATIENCE)
+        self._open = False
+        if whole:
+            self._instant.release()
         log.close()  # before it is no longer the present one: who sees that there is none may read it
         self._log = None
         if log.fault:

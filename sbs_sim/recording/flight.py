@@ -262,7 +262,8 @@ def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, A
     for topic in (body, rotors, inflow):
         if np.abs(topic.time_ns).max(initial=0) > LATEST_STATE:
             raise RecordingError(f"topic {topic.name} has a time of more than {LATEST_STATE * 1e-9:g} s")
-    times, where = _common(body.time_ns, rotors.time_ns, inflow.time_ns)
+    where = _together(body, rotors, inflow)
+    times = body.time_ns[where[0]]
     layout = aircraft.layout
     states = np.zeros((len(times), layout.size))
     fields = [f"position.{axis}" for axis in "xyz"] + [f"attitude.{axis}" for axis in "wxyz"]
@@ -278,16 +279,25 @@ def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, A
     return np.round(times * 1e-9 / step_size).astype(np.int64), states
 
 
-def _common(*times: IntArray) -> tuple[IntArray, list[IntArray]]:
-    """Instants that all topics have, and where; an instant that comes twice (a reset) keeps its order."""
-    keys = []
-    for own in times:
-        first = np.searchsorted(own, own, side="left")
-        keys.append(own * 16 + np.minimum(np.arange(len(own)) - first, 15))
-    common = keys[0]
-    for other in keys[1:]:
-        common = np.intersect1d(common, other)
-    return common // 16, [np.searchsorted(own, common) for own in keys]
+def _together(*topics: Topic) -> list[IntArray]:
+    """Where each topic has the messages of the snapshots that all of them have, in the order of time.
+
+    An instant comes several times where there was a reset. In our logs the topics are numbered alike. Where the numbers
+    are those of somebody else, messages of one time belong together in their order, if no topic lacks one.
+    """
+    common = topics[0].sequence
+    for topic in topics[1:]:
+        common = np.intersect1d(common, topic.sequence)
+    if all((np.diff(topic.sequence) > 0).all() for topic in topics):
+        places = [np.searchsorted(topic.sequence, common) for topic in topics]
+        first, *others = (topic.time_ns[place] for topic, place in zip(topics, places, strict=True))
+        if len(common) and all((other == first).all() for other in others) and (np.diff(first) >= 0).all():
+            return places
+    times = np.unique(np.concatenate([topic.time_ns for topic in topics]))
+    counts = [np.bincount(np.searchsorted(times, topic.time_ns), minlength=len(times)) for topic in topics]
+    whole = times[np.all([count == counts[0] for count in counts], axis=0)]
+    orders = [np.argsort(topic.time_ns, kind="stable") for topic in topics]
+    return [order[np.isin(topic.time_ns[order], whole)] for topic, order in zip(topics, orders, strict=True)]
 
 
 # --- flown again ------------------------------------------------------------------------------------------------
@@ -310,7 +320,8 @@ def verify(flight: Flight, progress: Callable[[float, float], None] | None = Non
     first: Difference | None = None
     largest: Difference | None = None
     scale = np.maximum(np.abs(flight.states).max(axis=0), 1e-12)
-    for i, flown in _beside(flight, refly(flight.aircraft, flight.events, int(flight.steps[-1]), **flight.options)):
+    again = refly(flight.aircraft, flight.events, int(flight.steps[-1]), **flight.options)
+    for i, flown in _beside(flight, again, scale):
         if progress is not None:
             progress(i + 1, len(flight.states))
         logged = flight.states[i]
@@ -331,17 +342,21 @@ def verify(flight: Flight, progress: Callable[[float, float], None] | None = Non
     return Verification(len(flight.states), first, largest, differences(flight.versions))
 
 
-def _beside(flight: Flight, flown: Iterable[Snapshot]) -> Iterator[tuple[int, Snapshot]]:
-    """Index of each recorded state with the snapshot that was flown at its step; around a reset a step has several."""
+def _beside(flight: Flight, flown: Iterable[Snapshot], scale: Array) -> Iterator[tuple[int, Snapshot]]:
+    """Index of each recorded state with the snapshot that was flown at its step.
+
+    Around a reset a step has several, in their order, and the nearest one is meant. A state may have been recorded
+    twice: older logs have that where a fault has ended the flight before the first step of a tick.
+    """
     places: dict[int, list[int]] = {}
     for i, step in enumerate(flight.steps.tolist()):
         places.setdefault(step, []).append(i)
     for step, group in itertools.groupby(flown, key=lambda snapshot: snapshot.step):
         snapshots = list(group)
         for i in places.pop(step, []):
-            recorded = flight.states[i].tobytes()
-            match = next((k for k, found in enumerate(snapshots) if found.state.tobytes() == recorded), 0)
-            yield i, snapshots[match]
-            snapshots = snapshots[match + 1 :] or snapshots[-1:]
+            if len(snapshots) > 1:
+                distances = [np.abs((found.state - flight.states[i]) / scale).max() for found in snapshots]
+                snapshots = snapshots[int(np.argmin(distances)) :]
+            yield i, snapshots[0]
     if places:
         raise RecordingError(f"step {min(places)} was recorded but is not flown by the events of the log")

@@ -38,7 +38,7 @@ from sbs_msgs.msg import (  # noqa: E402
 )
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.errors import RecordingError  # noqa: E402
-from sbs_sim.nodes.replay import fly_with  # noqa: E402
+from sbs_sim.nodes.replay import fly_with, is_shared  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
 from sbs_sim.recording.flight import flight_of  # noqa: E402
 from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
@@ -107,6 +107,15 @@ def test_a_topic_that_somebody_else_publishes_is_not_played(tmp_path):
         others = replay(HOVER_STEP, "--end", 0.1, "--delay", 30, "--topics", "state", domain=made.domain)
         assert others.returncode == 0, others.stderr
         made.client.until(lambda: states, "a replayed state")
+
+
+def test_what_every_node_publishes_is_nobodys_own():
+    assert [is_shared(name) for name in ("/diagnostics", "/h1/diagnostics", "/h1/state", "/clock")] == [
+        True,
+        True,
+        False,
+        False,
+    ]
 
 
 def test_replay_can_be_paused(tmp_path, recorded):

@@ -61,8 +61,8 @@ Progress = Callable[[float, float], None]  # takes what is done and the total
 LARGEST_RATE = 1000.0
 LONGEST_DELAY = 3600.0  # s
 EMPTY = "structure_needs_at_least_one_member"
-# of which every node may be a publisher
-SHARED = frozenset(("/rosout", "/parameter_events", "/diagnostics", "/tf", "/tf_static"))
+# of which every node may be a publisher, in any namespace
+SHARED = frozenset(("rosout", "parameter_events", "diagnostics", "tf", "tf_static"))
 NEWER, OLDER = ("--set", "--out"), ("--with", "--output")  # names of the same options
 PLAYING = ("rate", "start", "end", "loop", "topics", "delay")
 ROUNDING = 1e-6  # s
@@ -208,8 +208,8 @@ class Replay(Component):
         if not self._next_look <= now < self._lookout_end:
             return
         self._next_look = now + LOOK_PERIOD
-        for name in sorted({output.topic_name for output in self._outputs.values()} - SHARED):
-            if self.count_publishers(name) > 1:
+        for name in sorted({output.topic_name for output in self._outputs.values()}):
+            if not is_shared(name) and self.count_publishers(name) > 1:
                 remedy = "--topics chooses others, another ROS_DOMAIN_ID keeps apart"
                 raise SbsError(f"somebody else publishes {name} already: {remedy}")
 
@@ -276,6 +276,11 @@ class Replay(Component):
 def _names(channel: Channel) -> set[str]:
     """What a topic may be called on the command line."""
     return {channel.topic, channel.topic.lstrip("/")}
+
+
+def is_shared(topic: str) -> bool:
+    """True for topics of which every node may be a publisher."""
+    return topic.rpartition("/")[2] in SHARED
 
 
 def installed_type(channel: Channel, schema: Schema | None) -> Any:

@@ -302,7 +302,8 @@ class NewFile:
         """Where the file is now, if it is anywhere and the system tells (Linux)."""
         with contextlib.suppress(OSError):
             place = Path(os.readlink(f"/proc/self/fd/{self._descriptor}"))
-            if os.fstat(self._descriptor).st_nlink and self._is_at(place):
+            # NFS keeps a deleted file under such a name, until it is closed
+            if os.fstat(self._descriptor).st_nlink and self._is_at(place) and not place.name.startswith(".nfs"):
                 return place
         raise RecordingError(f"{self.path} was deleted while it was written: what was in it is lost")
 

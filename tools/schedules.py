@@ -220,7 +220,7 @@ def main(arguments: list[str] | None = None) -> int:
     rclpy.init(domain_id=options.domain, signal_handler_options=SignalHandlerOptions.NO)
     counts: collections.Counter[str] = collections.Counter()
     wrong, begin = 0, time.monotonic()
-    with progress_bar("flight") as progress:
+    with progress_bar("flight") as progress, contextlib.suppress(KeyboardInterrupt):  # what has been flown is told
         for number in range(options.first, options.first + options.flights):
             with tempfile.TemporaryDirectory() as name:
                 folder = Path(name)
@@ -233,10 +233,11 @@ def main(arguments: list[str] | None = None) -> int:
                     wrong += 1
                     place = traceback.extract_tb(error.__traceback__)[-1]
                     print(f"flight {number}: {error!r} in {place.name}, line {place.lineno}", flush=True)
+            counts["flights"] += 1
             if progress is not None:
                 progress(number - options.first + 1, options.flights)
     rclpy.shutdown()
-    print(f"{options.flights} flights in {time.monotonic() - begin:.0f} s, {wrong} wrong")
+    print(f"{counts.pop('flights', 0)} flights in {time.monotonic() - begin:.0f} s, {wrong} wrong")
     print(", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
     return min(wrong, 1)
 

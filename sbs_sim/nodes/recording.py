@@ -41,7 +41,7 @@ class Recording(Component):
 
     def __init__(self, simulation: Simulation, loop: FlightLoop, parameters: dict[str, Any]) -> None:
         super().__init__("recorder")
-        self._simulation, self._loop, self._parameters = simulation, loop, parameters
+        self._simulation, self._loop, self._flown_with = simulation, loop, parameters
         self._topics: list[tuple[str, Any, QoSProfile, str]] = []
         self._lock = threading.Lock()  # topics may be added while a log begins
         self._log: Recorder | None = None
@@ -128,7 +128,7 @@ class Recording(Component):
 
         if self._log is not None:
             raise RecordingError(f"recording {self.path} already: record = false ends it")
-        log = Recorder(record, self._simulation, self._parameters)
+        log = Recorder(record, self._simulation, self._flown_with)
         with self._lock:
             try:
                 self._channels = [log.channel(*topic) for topic in self._topics]

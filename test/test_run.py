@@ -156,12 +156,12 @@ def test_python_without_venv_and_headers(clone):
 
 
 def test_python_without_wheels(clone):
-    clone.fake_python("cpython 3.14", "3.14 True True")
-    assert_one_line(clone.call("simulator"), "cpython 3.14", "3.10 to 3.13", "remedy: install one of these")
-    clone.fake("python3.12", "exit 0")
+    clone.fake_python("cpython 3.15", "3.15 True True")
+    assert_one_line(clone.call("simulator"), "cpython 3.15", "3.10 to 3.14", "remedy: install one of these")
+    clone.fake("python3.14", "exit 0")
     clone.fake("python3.10", "exit 0")
     clone.fake("python3.11", "exit 127")
-    assert_one_line(clone.call("simulator"), "remedy: call with PYTHON=python3.12 or PYTHON=python3.10\n")
+    assert_one_line(clone.call("simulator"), "remedy: call with PYTHON=python3.14 or PYTHON=python3.10\n")
 
 
 def test_processor_without_wheels(clone):

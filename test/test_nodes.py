@@ -15,9 +15,18 @@ rclpy = pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import Point, Vector3  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
-from rcl_interfaces.srv import SetParametersAtomically  # noqa: E402
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from ros_harness import DOMAINS, EXECUTABLES, controls_message, environment, swashplate_message, world  # noqa: E402
+from ros_harness import (  # noqa: E402
+    DOMAINS,
+    EXECUTABLES,
+    PATIENCE,
+    Client,
+    controls_message,
+    environment,
+    swashplate_message,
+    world,
+)
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
@@ -34,6 +43,7 @@ from sbs_msgs.msg import (  # noqa: E402
 from sbs_msgs.srv import Reset, SetWind, Step  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.nodes.host import SERVICE_QOS  # noqa: E402
+from sbs_sim.recording import read  # noqa: E402
 
 TOPICS = {
     "state": BodyState,
@@ -450,13 +460,78 @@ def test_simulator_and_mixer_in_two_processes(own_world, hover):
     assert simulator.interrupt() == 0
 
 
-def test_namespaces_and_remaps(own_world):
-    own_world.start("simulator", remaps=["__ns:=/left", "odom:=truth"])
+def test_namespaces_remaps_and_a_name_of_its_own(own_world):
+    """Two beside each other: each with its names, its clock and its commands; a new name is that of the first node."""
+    left = own_world.start("simulator", remaps=["__ns:=/left", "odom:=truth", "__node:=drone"])
+    own_world.start("simulator", remaps=["__ns:=/right"], components="[simulator]", record="off")
+    mixer = own_world.start("control_mixer", remaps=["__ns:=/right"])
     client = own_world.client
-    client.watch("/left/state", BodyState)
-    client.watch("/left/truth", Odometry)
-    client.next("/left/state")
-    client.next("/left/truth")
+    kinds = {"/left/state": BodyState, "/left/truth": Odometry, "/left/clock": Clock, "/right/clock": Clock}
+    for name, kind in {**kinds, "/right/state": BodyState, "/right/diagnostics": DiagnosticArray}.items():
+        client.watch(name, kind)
+    for name in kinds:
+        client.next(name)
+    assert client.node.count_publishers("/clock") == 0
+    nodes = sorted(f"{space}/{name}" for name, space in client.node.get_node_names_and_namespaces())
+    others = [name for name in nodes if name.startswith("/left/")]
+    assert others == ["/left/analysis", "/left/control_mixer", "/left/drone", "/left/recorder"]
+    client.call(GetParameters, "/left/drone/get_parameters", names=["airspeed"])
+    # a mixer in a process of its own follows the clock of its namespace
+    wanted = trim(Aircraft.load("sbs")).controls + [DEGREE, 0, 0, 0]
+    client.publish_until("/right/controls", controls_message(wanted), "/right/state", lambda m: m.velocity.z < -0.1)
+    told = client.next("/right/diagnostics", lambda m: (s := status_of(m, "control_mixer")) and "nobody" not in s.message)
+    assert told.header.stamp.sec > 0 or told.header.stamp.nanosec > 0
+    assert mixer.running
+    assert "too" not in left.output
+    assert "same name" not in left.output  # as ROS complains of two nodes of one name
+
+
+def test_a_second_simulator_on_the_same_names_is_told(own_world):
+    client = own_world.client
+    client.watch("diagnostics", DiagnosticArray)
+    first = own_world.start("simulator", components="[simulator]", record="off")
+
+    def told(array, name="simulator"):
+        status = status_of(array, name)
+        return status and "/simulator publishes /clock, " in status.message
+
+    client.next("diagnostics", lambda m: (s := status_of(m, "simulator")) and s.level == DiagnosticStatus.OK)
+    second = own_world.start("simulator", components="[simulator]", record="off")
+    array = client.next("diagnostics", told)
+    assert status_of(array, "simulator").level == DiagnosticStatus.WARN
+    assert "/state, " in array.status[0].message
+    assert "-r __ns:=" in array.status[0].message
+    for process in (first, second):  # and each says so once
+        client.until(lambda process=process: "/simulator publishes" in process.output, "a line in the log")
+        assert process.output.count("/simulator publishes") == 1
+    assert second.interrupt() == 0
+    client.next("diagnostics", lambda m: (s := status_of(m, "simulator")) and s.level == DiagnosticStatus.OK)
+
+
+def test_who_comes_to_a_paused_flight_gets_its_present_state(own_world):
+    simulator, client = own_world.start("simulator"), own_world.client
+    states = client.watch("state", BodyState)
+    client.next("state")
+    assert client.call(SetBool, "pause", data=True).success
+    _, present = stepped(client, 1)
+    client.spin(0.3)
+    seen = len(states)
+    latecomer = Client(own_world.domain, "latecomer")
+    try:
+        kinds = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "odom": Odometry}
+        heard = {name: latecomer.watch(name, kind) for name, kind in kinds.items()}
+        latecomer.until(lambda: all(heard.values()), "the present state")
+        assert {stamp(messages[0]) for messages in heard.values()} == {stamp(present)}
+        assert heard["state"][0] == present
+        client.spin(2.5)
+        again = states[seen:]  # a second time, for who may have missed the first, and that is all
+        assert 1 <= len(again) <= 2
+        assert all(message == present for message in again)
+    finally:
+        latecomer.close()
+    assert simulator.interrupt() == 0
+    (path,) = (own_world.folder / "bags").glob("*.mcap")
+    assert (np.diff(read(path)["state"].time_ns) > 0).all()  # it is recorded once
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -617,6 +692,29 @@ def test_an_interruption_during_a_long_service_does_not_wait_for_it(own_world):
     assert process.interrupt() == 0
     assert time.monotonic() - begin < 20.0
     assert "Traceback" not in process.output
+
+
+INTERRUPTED_IN_THE_LOCK = """
+import os, signal, sys, threading
+from sbs_sim.nodes.host import run
+
+class Busy(threading.Event):
+    def wait(self, timeout=None):
+        with self._cond:  # as every wait does for an instant
+            os.kill(os.getpid(), signal.SIGINT)
+        return super().wait(timeout)
+
+sys.exit(run(lambda: [], ["nothing"], Busy()))
+"""
+
+
+def test_an_interruption_at_any_instant_ends_a_process():
+    """A handler that sets the event that is waited for hangs where that one is locked just then."""
+    started = subprocess.Popen([sys.executable, "-c", INTERRUPTED_IN_THE_LOCK], env=environment(next(DOMAINS)))
+    try:
+        assert started.wait(PATIENCE / 2) == 0
+    finally:
+        started.kill()
 
 
 def test_an_argument_that_is_not_ours_is_refused():

@@ -474,7 +474,7 @@ def test_a_log_begun_in_mid_flight_flies_with_a_changed_aircraft(tmp_path, hover
     # rotors that turn more slowly take fewer steps to a tick, and the wind is older than the log
     flight, slow = flight_of(read(path)), tmp_path / "slow.mcap"
     changes = [f"rotors[{j}].speed_rpm=1800" for j in (0, 1)]
-    fly_with(flight, changes, int(flight.steps[-1]), slow, threading.Event())
+    fly_with(flight, changes, int(flight.steps[-1]), slow)
     wind = [read(found)["events"]["wind_step"][0] for found in (path, slow)]
     assert wind[1] * 29 == wind[0] * 22
     assert_identical(slow)

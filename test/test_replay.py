@@ -393,7 +393,7 @@ def test_messages_that_are_none_are_left_out_and_all_others_are_played(tmp_path)
 
 def test_two_flights_in_one_file_are_told_and_can_be_chosen(tmp_path, recorded):
     heavy, both = tmp_path / "heavy.mcap", tmp_path / "both.mcap"
-    fly_with(flight_of(read(recorded)), ["body.mass=23"], 10**6, heavy, threading.Event())
+    fly_with(flight_of(read(recorded)), ["body.mass=23"], 10**6, heavy)
     merge(both, recorded, heavy)
     titles = [f"{number} is /state begun {wall}" for number, wall in enumerate(map(begin, (recorded, heavy)), 1)]
     found = replay(both, domain=next(DOMAINS))

@@ -1,5 +1,6 @@
 """Who can reach a running simulator, and what it can be made to do with files."""
 
+import contextlib
 import json
 import os
 import re
@@ -19,7 +20,9 @@ from ros_harness import DOMAINS, EXECUTABLES, environment, world  # noqa: E402
 from sbs_msgs.msg import BodyState  # noqa: E402
 from sbs_sim.nodes.host import run  # noqa: E402
 
+IS_OLD_DDS = "/libfastrtps.so" in Path("/proc/self/maps").read_text()
 ROOT = Path(__file__).resolve().parents[1]
+READ_BY_DDS = "FASTRTPS_DEFAULT_PROFILES_FILE" if IS_OLD_DDS else "FASTDDS_DEFAULT_PROFILES_FILE"
 YAML_LOADERS = re.compile(r"YAML\((?P<arguments>[^)]*)\)")
 
 
@@ -36,12 +39,45 @@ def test_nothing_listens_beyond_loopback(tmp_path):
         assert "/dev/shm/fastrtps" not in Path(f"/proc/{process.pid}/maps").read_text()
 
 
+def run_alone(*arguments, **changes):
+    """A Python where there is no network at all."""
+    own = {key: value for key, value in environment(next(DOMAINS)).items() if "PROFILES_FILE" not in key}
+    command = ["unshare", "--map-root-user", "--net", sys.executable, *arguments]
+    return subprocess.run(command, env={**own, **changes}, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_a_profile_that_dds_does_not_take_ends_the_start():
+    """As if a release of Fast DDS read it from another variable: nothing is open to the network for long."""
+    wrong = READ_BY_DDS.replace("RTPS", "DDS") if IS_OLD_DDS else READ_BY_DDS.replace("DDS", "RTPS", 1)
+    changes = {wrong: str(ROOT / "config" / "loopback.xml"), "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}
+    if run_alone("-c", "").returncode:
+        pytest.skip("this machine gives processes no network of their own")
+    ended = run_alone(str(EXECUTABLES / "control_mixer"), **changes)
+    assert ended.returncode == 1, ended.stderr
+    told = ended.stderr.splitlines()[-1]
+    assert told.startswith("DDS listens on 0.0.0.0 port 7")
+    assert "loopback.xml" in told
+    assert "Traceback" not in ended.stderr
+
+
+def test_only_sockets_that_others_reach_count():
+    from sbs_sim.nodes.confinement import listening_beyond
+
+    before = listening_beyond()
+    with contextlib.ExitStack() as stack:
+        for family, address in ((socket.AF_INET, "127.0.0.2"), (socket.AF_INET6, "::1"), (socket.AF_INET, "0.0.0.0")):
+            made = stack.enter_context(socket.socket(family, socket.SOCK_DGRAM))
+            made.bind((address, 0))
+        assert set(listening_beyond()) - set(before) == {f"0.0.0.0 port {made.getsockname()[1]}"}
+    assert listening_beyond() == before
+
+
 def test_the_user_has_the_last_word_on_the_network(tmp_path):
     """A profile of one's own is taken: here one that gives the participant a name."""
     profile = tmp_path / "own.xml"
     text = (ROOT / "config" / "loopback.xml").read_text()
     profile.write_text(text.replace("<rtps>", "<rtps><name>/own_name</name>"))
-    names = ("FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY_RANGE")
+    names = (READ_BY_DDS, "ROS_AUTOMATIC_DISCOVERY_RANGE")
     code = "from sbs_sim.nodes import host; host.keep_to_this_machine()"
     code += f"; import os; print(*map(os.environ.get, {names}))"
     own = {**environment(next(DOMAINS)), names[0]: str(profile), names[1]: "LOCALHOST"}
@@ -52,7 +88,7 @@ def test_the_user_has_the_last_word_on_the_network(tmp_path):
 def test_where_ros_is_for_the_network_nothing_is_changed():
     code = "from sbs_sim.nodes import host; host.keep_to_this_machine()"
     name = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    code += f"; import os; print('FASTRTPS_DEFAULT_PROFILES_FILE' in os.environ, os.environ['{name}'])"
+    code += f"; import os; print('{READ_BY_DDS}' in os.environ, os.environ['{name}'])"
     own = {key: value for key, value in environment(1).items() if "PROFILES_FILE" not in key}
     for wanted, there in (("SUBNET", "False SUBNET"), ("LOCALHOST", "True SYSTEM_DEFAULT")):
         command = [sys.executable, "-c", code]

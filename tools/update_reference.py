@@ -27,7 +27,7 @@ NOTE = "<!-- Made by tools/update_reference.py: do not edit. -->"
 PARAMETERS = ("simulator", "control_mixer", "analysis", "hover_hold", "teleop", "joystick")
 # What the definitions of others leave unsaid.
 MEANINGS = {
-    "/clock": "Simulation time. Its name is absolute, all others follow namespaces and remaps.",
+    "clock": "Simulation time: `/clock`, but `/left/clock` in the namespace `/left`.",
     "diagnostics": "Health of the nodes: time-outs, clipped controls, refused messages.",
     "joy": "Axes and buttons of a pad or transmitter.",
     "odom": "The motion of `state` in the axes of ROS: earth ENU, body FLU.",
@@ -170,9 +170,10 @@ def topic_rows() -> list[list[str]]:
 
 
 TOPICS = """
-Units are SI, angles radians. Names are relative but for `/clock`, so namespaces and remaps work. Besides the nodes of
-this table, `cockpit` listens to what it draws and steers by `controls`, `replay` publishes what its log holds, and
-everybody may publish `controls` or, without the mixer, `swashplate`.
+Units are SI, angles radians. Names are relative, so namespaces and remaps work. Nodes of others with `use_sim_time` listen
+to `/clock` wherever they are: in a namespace they need `-r /clock:=/left/clock`. Besides the nodes of this table, `cockpit`
+listens to what it draws and steers by `controls`, `replay` publishes what its log holds, and everybody may publish
+`controls` or, without the mixer, `swashplate`.
 """
 
 

@@ -74,7 +74,8 @@ class Arrivals(Refusals):
         if oddest > 0.0:
             found.append(f"{self._what} stamped up to {oddest:.3g} s ago")
         elif oddest < 0.0:
-            found.append(f"{self._what} stamped up to {-oddest:.3g} s ahead of /clock, not by use_sim_time")
+            clock = self._node.resolve_topic_name("clock")
+            found.append(f"{self._what} stamped up to {-oddest:.3g} s ahead of {clock}, not by use_sim_time")
         senders = self._node.get_publishers_info_by_topic(self._topic)
         if len(senders) > 1:
             names = ", ".join(

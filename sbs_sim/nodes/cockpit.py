@@ -129,7 +129,7 @@ def main(args: list[str] | None = None) -> None:
         make_parser().error(f"{min(given)}: parameters are those of a simulator: not allowed with --attach and --logs")
     end = threading.Event()
     start = Start(options, ros_arguments, end)
-    code = run(start.nodes, [arguments[0], *ros_arguments], end)
+    code = run(start.nodes, [arguments[0], *ros_arguments], end, first="cockpit")
     sys.exit(start.finish() or code)
 
 
@@ -182,7 +182,8 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 def _refuse_second_simulator(lookout: Component, until: float) -> None:
     """Raise SbsError if a simulator is discovered whose topics this one would publish too."""
-    while not lookout.count_publishers("inflow"):
+    inflow = lookout.resolve_topic_name("inflow")  # where it is remapped, too
+    while not lookout.count_publishers(inflow):
         if (left := until - time.monotonic()) <= 0.0:
             return
         time.sleep(min(left, 0.05))

@@ -10,7 +10,8 @@ import time
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
-from rclpy.parameter import Parameter as ROSParameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock as ClockMessage
 
 from sbs_msgs.msg import Controls, FlightEvent, SwashplateArray
 from sbs_sim.aircraft import Aircraft
@@ -19,7 +20,7 @@ from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.mixer import Mixer
 from sbs_sim.model.state import SWASHPLATE_NAMES
 from sbs_sim.nodes.arrivals import Arrivals
-from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, swashplate_messages, to_time
+from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, swashplate_messages, to_seconds, to_time
 from sbs_sim.nodes.host import (
     COMMAND_QOS,
     COMPLAINT_PERIOD,
@@ -38,6 +39,7 @@ from sbs_sim.nodes.host import (
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
 }
+CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # as rclpy listens to a clock
 RAMP_PERIOD = 0.01  # s of wall time between outputs while a swashplate is still on its way
 
 
@@ -48,16 +50,14 @@ class ControlMixer(Component):
     ----------
     loop : FlightLoop, optional
         The flight, if it is in the same process: the mixer then knows the time, where the swashplates stand and of
-        resets. Else time comes from /clock, and where the swashplates stand from the events of the flight; until
+        resets. Else time comes from `clock` of its namespace, and where the swashplates stand from the events of the flight; until
         one comes, they are taken to be at the first target.
     log : Log, optional
         Where accepted controls and the diagnostics are recorded.
     """
 
     def __init__(self, loop: FlightLoop | None = None, log: Log | None = None) -> None:
-        # the simulator owns time: rates are those of simulated time, and a pause holds the swashplates
-        clock_topic = ROSParameter("use_sim_time", value=loop is None)
-        super().__init__("control_mixer", parameter_overrides=[clock_topic])
+        super().__init__("control_mixer")
         self._loop = loop
         self._mixer = Mixer(Aircraft.load(declare(self, PARAMETERS)["aircraft"]) if loop is None else loop.aircraft)
         self._resets = 0
@@ -68,6 +68,10 @@ class ControlMixer(Component):
         self._arrivals = Arrivals(self, Controls, "controls", COMMAND_QOS, log)
         self.create_subscription(Controls, "controls", self._on_controls, COMMAND_QOS)
         if loop is None:
+            # The simulator owns time: rates are those of simulated time, and a pause holds the swashplates. Not by
+            # use_sim_time, which listens to the one /clock of all namespaces.
+            self._told_time = 0.0
+            self._time = self.create_subscription(ClockMessage, "clock", self._on_clock, CLOCK_QOS)
             self.create_subscription(FlightEvent, "events", self._on_event, EVENT_QOS)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._ramp = self.create_timer(RAMP_PERIOD, self._go_on, clock=steady, autostart=False)
@@ -75,7 +79,10 @@ class ControlMixer(Component):
 
     def _now(self) -> float:
         """Simulation time [s]."""
-        return self.get_clock().now().nanoseconds * 1e-9 if self._loop is None else self._loop.time
+        return self._told_time if self._loop is None else self._loop.time
+
+    def _on_clock(self, message: ClockMessage) -> None:
+        self._told_time = to_seconds(message.clock)
 
     def _follow_resets(self) -> bool:
         """Forget what was commanded before a reset; true if there was one."""
@@ -141,8 +148,8 @@ class ControlMixer(Component):
     def _publish_health(self) -> None:
         problems = [(DiagnosticStatus.WARN, f"clipped: {text}") for text in self._mixer.saturated]
         problems += self._arrivals.problems()
-        if self._loop is None and not self.count_publishers("/clock"):
-            problems.append((DiagnosticStatus.WARN, "no simulator: nobody publishes /clock"))
+        if self._loop is None and not self.count_publishers(self._time.topic_name):
+            problems.append((DiagnosticStatus.WARN, f"no simulator: nobody publishes {self._time.topic_name}"))
         values = {"rate_limited": not self._mixer.arrived, **self._arrivals.values()}
         message = DiagnosticArray(status=[diagnostic("control_mixer", problems, values)])
         message.header.stamp = to_time(self._now())

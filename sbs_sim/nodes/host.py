@@ -2,6 +2,7 @@
 
 import array
 import os
+import re
 import sys
 import threading
 import traceback
@@ -22,9 +23,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 
-from sbs_sim.aircraft import config_folder
 from sbs_sim.command_line import suggestion
 from sbs_sim.errors import SbsError
+from sbs_sim.nodes.confinement import check_confinement, keep_to_this_machine
 from sbs_sim.nodes.executables import ignore_interruptions, when_interrupted
 
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
@@ -33,6 +34,7 @@ ROS_REFUSALS = (rclpy_implementation.RCLError, NameValidationException, Paramete
 HEALTH_PERIOD = 1.0  # s of wall time between diagnostics
 COMPLAINT_PERIOD = 1.0  # s between complaints about bad input
 STOP_PERIOD = 0.2  # s, longest time that a thread takes to see the end
+LOOK_PERIOD = 0.1  # s between looks whether there was an interruption
 DISCOVERY = 1.5  # s in which others that run already are found
 END_PATIENCE = 3.0  # s that a thread may take to end
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
@@ -100,6 +102,20 @@ class Topic:
         self._publisher.publish(data)
         self._write(data, time, wait, essential)
 
+    def publish_again(self, message: Any) -> None:
+        """Publish a message that is in the log already."""
+        self._publisher.publish(message)
+
+    @property
+    def name(self) -> str:
+        """Full name of the topic."""
+        return str(self._publisher.topic_name)
+
+    @property
+    def subscribers(self) -> int:
+        """How many listen."""
+        return int(self._publisher.get_subscription_count())
+
     def record(self, message: Any, time: float, wait: bool = False, essential: bool = False) -> None:
         """Write a message into the log alone."""
         self._write(serialize_message(message), time, wait, essential)
@@ -120,6 +136,7 @@ class Component(Node):
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
+        check_confinement()
         self.workers: list[threading.Thread] = []
 
     def stop(self) -> None:
@@ -232,7 +249,11 @@ def diagnostic(name: str, problems: Sequence[tuple[bytes, str]], values: dict[st
 
 
 def run(
-    make_nodes: Callable[[], list[Component]], args: list[str] | None = None, end: threading.Event | None = None
+    make_nodes: Callable[[], list[Component]],
+    args: list[str] | None = None,
+    end: threading.Event | None = None,
+    first: str = "",
+    asked: list[int] | None = None,
 ) -> int:
     """Run nodes until they are interrupted or have done their work; the exit code of the process.
 
@@ -248,6 +269,10 @@ def run(
         Command line, sys.argv if not given.
     end : threading.Event, optional
         Set by a node that has done its work.
+    first : str, optional
+        Of a process with several nodes the one that a new name (`__node:=x`, `name=` of a launch file) is for.
+    asked : list of int, optional
+        Of a caller that heeds interruptions before its nodes are there: what it gave `heed`.
 
     Returns
     -------
@@ -265,19 +290,22 @@ def run(
         return 2
     keep_to_this_machine()
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        given = named_alone(sys.argv if args is None else args, first)
+        rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
         print(f"cannot start ROS: {_one_line(error)}", file=sys.stderr)
         return 1
     nodes: list[Component] = []
     threads: list[threading.Thread] = []
+    noted = [] if asked is None else asked
     try:
         nodes = make_nodes()
-        when_interrupted(lambda *_: stop.set())
+        heed(noted)
         threads = [threading.Thread(target=_spin, args=(node, stop), name=node.get_name()) for node in nodes]
         for thread in threads:
             thread.start()
-        stop.wait()
+        while not noted and not stop.wait(LOOK_PERIOD):
+            pass
     except (SbsError, *ROS_REFUSALS) as error:
         print(_one_line(error), file=sys.stderr)
         return 1
@@ -299,6 +327,14 @@ def run(
     return 0
 
 
+def heed(asked: list[int]) -> None:
+    """Have interruptions take a note, and do nothing else.
+
+    What a handler does happens inside of whatever this thread does: an event could be locked then, for good.
+    """
+    when_interrupted(lambda number, _: asked.append(number))
+
+
 def own_arguments(args: list[str] | None) -> list[str]:
     """Arguments of a command line that are not for ROS.
 
@@ -313,17 +349,18 @@ def own_arguments(args: list[str] | None) -> list[str]:
         raise SbsError(f"wrong --ros-args: {_one_line(error)}") from None
 
 
-def keep_to_this_machine() -> None:
-    """Have Fast DDS use 127.0.0.1 and nothing else where discovery is for this machine only: see config/loopback.xml.
+def named_alone(args: Sequence[str], first: str) -> list[str]:
+    """Command line in which a new name for every node of the process (`__node:=x`) is one for the first of them alone.
 
-    A profile of the user's own is left alone. To be called before ROS is started.
+    Else all of them would have it: no parameter service could tell them apart.
     """
-    profiles = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-    is_ours = rclpy.utilities.get_rmw_implementation_identifier().startswith("rmw_fastrtps")
-    local = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
-    if local and is_ours and not any(map(os.environ.get, profiles)):
-        os.environ[profiles[0]] = str(config_folder() / "loopback.xml")
-        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "SYSTEM_DEFAULT"  # what the profile says
+    changed, of_ros, is_rule = [], False, False
+    for arg in args:
+        of_ros = arg != "--" if of_ros else arg == "--ros-args"
+        renames = first and of_ros and is_rule and re.match("__(node|name):=", arg)
+        changed.append(f"{first}:{arg}" if renames else arg)
+        is_rule = arg in ("-r", "--remap")
+    return changed
 
 
 def _spin(node: Node, stop: threading.Event) -> None:

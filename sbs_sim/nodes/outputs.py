@@ -16,6 +16,7 @@ from rosgraph_msgs.msg import Clock
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray, SimulationStatus
 from sbs_sim.flight_loop import FlightLoop, Report
 from sbs_sim.nodes.arrivals import Arrivals
+from sbs_sim.nodes.company import Latecomers, Rivals
 from sbs_sim.nodes.conversions import StateMessages, event_message, fill_working_states, to_time
 from sbs_sim.nodes.host import COMPLAINT_PERIOD, EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Topic, diagnostic
 from sbs_sim.simulation import Event
@@ -57,10 +58,13 @@ class Outputs:
             (Topic(node, InflowArray, "inflow", STATE_QOS, log), self._messages.inflow),
             (Topic(node, Odometry, "odom", STATE_QOS, log), self._messages.odom),
         )
-        self._clock = Topic(node, Clock, "/clock", STATE_QOS, log)
+        self._clock = Topic(node, Clock, "clock", STATE_QOS, log)
         self._events = Topic(node, FlightEvent, "events", EVENT_QOS, log)
         self._status_topic = Topic(node, SimulationStatus, "status", STATE_QOS, log)
         self._health = Topic(node, DiagnosticArray, "diagnostics", STATE_QOS, log)
+        own = (self._clock, *(topic for topic, _ in self._of_snapshots), self._events, self._status_topic)
+        self._rivals, self._rivals_said = Rivals(node, [topic.name for topic in own]), ""
+        self._latecomers = Latecomers(self._of_snapshots)
         steady = SteadyClock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(HEALTH_PERIOD, self._publish_health, clock=steady)
         self._thread = threading.Thread(target=self._publish_all, name="publisher", daemon=True)
@@ -75,6 +79,7 @@ class Outputs:
             self._say_changes(report)
             self._last_report = report
             self._fill_status(report)
+            self._latecomers.look(paused=not report.playing)
             if self._is_due(report):
                 with contextlib.nullcontext() if self._log is None else self._log.instant():
                     self._publish(report)
@@ -152,6 +157,14 @@ class Outputs:
             self._log_fault_said = fault
             self._node.get_logger().error(f"the log ends before the flight: {fault}")
 
+    def _look_for_rivals(self) -> str:
+        """Who publishes the same; one log line when that is new."""
+        rivals = self._rivals.look()
+        if rivals and rivals != self._rivals_said:
+            self._node.get_logger().warning(rivals)
+        self._rivals_said = rivals
+        return rivals
+
     def _publish_health(self) -> None:
         report = self._last_report
         if report is None:
@@ -159,6 +172,8 @@ class Outputs:
         problems = []
         if report.fault:
             problems.append((DiagnosticStatus.ERROR, report.fault))
+        if rivals := self._look_for_rivals():
+            problems.append((DiagnosticStatus.WARN, rivals))
         if report.command_timed_out:
             problems.append((DiagnosticStatus.WARN, "command timed out, holding the last one"))
         problems += [(DiagnosticStatus.WARN, f"outside the model's validity: {line}") for line in self._status.warnings]

@@ -42,6 +42,7 @@ from sbs_sim.nodes.host import (
     SERVICE_QOS,
     STATE_QOS,
     Component,
+    heed,
     own_arguments,
     run,
 )
@@ -359,7 +360,6 @@ def fly_with(
     changes: Sequence[str],
     last: int,
     output: Path,
-    stop: threading.Event,
     progress: Progress | None = None,
 ) -> tuple[Path, int]:
     """Fly the events of a flight with a changed aircraft into a new log.
@@ -372,10 +372,8 @@ def fly_with(
     last : int
         Step to end at.
     output : Path
-    stop : threading.Event
-        Ends the flight with a KeyboardInterrupt.
     progress : callable, optional
-        Called with the number of steps that have been flown and of all of them.
+        Called with the number of steps that have been flown and of all of them; what it raises ends the flight.
 
     Returns
     -------
@@ -400,7 +398,7 @@ def fly_with(
     log = Recorder(str(output), simulation, {"with": list(changes)})
     try:
         changed_flight = replace(flight, aircraft=aircraft, events=events)
-        steps = _write_flight(changed_flight, round(last * shorter), step_size, log, stop, progress)
+        steps = _write_flight(changed_flight, round(last * shorter), step_size, log, progress)
     except BaseException:  # an interruption too: half a flight looks like a whole one
         log.discard()
         raise
@@ -429,7 +427,6 @@ def _write_flight(
     last: int,
     step_size: float,
     log: Recorder,
-    stop: threading.Event,
     progress: Progress | None,
 ) -> int:
     """Fly to a step and record; the number of steps that were flown."""
@@ -454,8 +451,6 @@ def _write_flight(
     first = flown = flight.events[0].step
     try:
         for snapshot in refly(flight.aircraft, events, last, **flight.options):
-            if stop.is_set():
-                raise KeyboardInterrupt
             made.fill(snapshot)
             keep("clock", Clock(clock=to_time(snapshot.time)), snapshot.time)
             for role, message in (("state", made.state), ("rotors", made.rotors), ("inflow", made.inflow)):
@@ -613,18 +608,8 @@ def _tell_if_broken(log: Log) -> None:
 def _verify(path: Path, number: int | None) -> int:
     """0 if every state came again as it should."""
     flight = _flight(path, number)
-    stop = threading.Event()  # an exception would be lost in the callbacks of the compiler
-    when_interrupted(lambda *_: stop.set())
-
     with progress_bar("state") as show:
-
-        def progress(done: float, total: float) -> None:
-            if stop.is_set():
-                raise KeyboardInterrupt  # not at once, for the files of the flight are to be taken away
-            if show is not None:
-                show(done, total)
-
-        found = verify(flight, progress)
+        found = verify(flight, _interruptible(show))
     print(_verdict(found))
     for title, difference in (("first", found.first), ("largest", found.largest)):
         if difference is not None:
@@ -654,6 +639,23 @@ def _flight(path: Path, number: int | None) -> Flight:
     return flight_of(log)
 
 
+def _interruptible(show: Progress | None) -> Progress:
+    """Progress that raises KeyboardInterrupt after an interruption.
+
+    Raised by the signal's handler it would be lost in the callbacks of the compiler.
+    """
+    asked: list[int] = []
+    heed(asked)
+
+    def progress(done: float, total: float) -> None:
+        if asked:
+            raise KeyboardInterrupt
+        if show is not None:
+            show(done, total)
+
+    return progress
+
+
 def _fly_with(options: argparse.Namespace) -> int:
     """Fly the commands again, if they are all there."""
     log = read(options.file).flight(options.flight)
@@ -666,10 +668,8 @@ def _fly_with(options: argparse.Namespace) -> int:
         end = math.floor((whole - first * flight.step_size + ROUNDING) * 1e3) * 1e-3
         raise RecordingError(f"{log.path} lacks commands after {end:.3f} s: --end {end:.3f} flies those before")
     _tell_if_broken(log)
-    stop = threading.Event()  # an exception would be lost in the callbacks of the compiler
-    when_interrupted(lambda *_: stop.set())
-    with progress_bar("step") as progress:
-        path, steps = fly_with(flight, options.changes, last, Path(options.out), stop, progress)
+    with progress_bar("step") as show:
+        path, steps = fly_with(flight, options.changes, last, Path(options.out), _interruptible(show))
     print(f"{path}: {steps} of {last - first} steps")
     return 0
 

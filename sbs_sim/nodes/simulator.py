@@ -1,13 +1,12 @@
 """Node `simulator`: flies an aircraft in real time.
 
-Publishes `state`, `rotors`, `inflow`, `odom`, `/clock`, `status`, `diagnostics`; subscribes `swashplate`; serves
+Publishes `state`, `rotors`, `inflow`, `odom`, `clock`, `status`, `diagnostics`; subscribes `swashplate`; serves
 `pause`, `step`, `reset`, `set_wind`. The executable brings up the control mixer, the analysis and the recorder in the
 same process.
 """
 
 import math
 import sys
-import threading
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -24,8 +23,7 @@ from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
-from sbs_sim.nodes.executables import when_interrupted
-from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS, Component, Parameter, declare, run
+from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS, Component, Parameter, declare, heed, run
 from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.nodes.recording import Recording
 from sbs_sim.simulation import Simulation, trimmed_state
@@ -225,7 +223,7 @@ def checked_components(names: list[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _nodes(end: threading.Event) -> list[Component]:
+def _nodes(asked: list[int]) -> list[Component]:
     simulator = Simulator()
     nodes: list[Component] = [simulator]
     if "control_mixer" in simulator.components:
@@ -238,12 +236,12 @@ def _nodes(end: threading.Event) -> list[Component]:
     if simulator.log is not None:
         nodes.append(simulator.log)
     sys.setswitchinterval(TURN)
-    when_interrupted(lambda *_: end.set())  # a log that has begun is ended
+    heed(asked)  # a log that has begun is ended
     simulator.begin()  # last: what is loaded meanwhile would make it miss deadlines
     return nodes
 
 
 def main(args: list[str] | None = None) -> None:
     """Fly until interrupted."""
-    end = threading.Event()
-    sys.exit(run(lambda: _nodes(end), args, end))
+    asked: list[int] = []
+    sys.exit(run(lambda: _nodes(asked), args, first="simulator", asked=asked))

@@ -1,4 +1,4 @@
-"""Start simulators in namespaces and interrupt them at random moments, again and again: does every one end?
+"""Start simulators in namespaces and interrupt them at random moments, again and again, and see whether every one ends.
 
     ./run python tools/start_stop.py --count 300
 

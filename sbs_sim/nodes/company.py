@@ -49,8 +49,8 @@ class Rivals:
 class Latecomers:
     """Publishes the present once more when somebody begins to listen to a flight that stands still.
 
-    DDS brings nobody what was published before he came, and a paused flight publishes no state. Those who listen already
-    get the same message, with the same stamp, once more. Nothing of it is recorded again.
+    DDS brings nobody what was published before he came, and a paused flight publishes no state. Those who listen
+    already get the same message, with the same stamp, once more. Nothing of it is recorded again.
 
     Parameters
     ----------

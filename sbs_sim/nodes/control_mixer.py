@@ -50,8 +50,8 @@ class ControlMixer(Component):
     ----------
     loop : FlightLoop, optional
         The flight, if it is in the same process: the mixer then knows the time, where the swashplates stand and of
-        resets. Else time comes from `clock` of its namespace, and where the swashplates stand from the events of the flight; until
-        one comes, they are taken to be at the first target.
+        resets. Else time comes from `clock` of its namespace, and where the swashplates stand from the events of the
+        flight; until one comes, they are taken to be at the first target.
     log : Log, optional
         Where accepted controls and the diagnostics are recorded.
     """

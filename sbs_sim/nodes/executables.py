@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 
 from sbs_sim import command_line
+from sbs_sim.nodes.output import wait_for_no_reader
 
 INTERRUPTED = 128 + signal.SIGINT  # exit code of what was not meant to run until Ctrl-C
 OWN_COMMAND_LINE = ("replay", "cockpit")
@@ -69,6 +70,7 @@ def _run(name: str, interrupted: int = 0) -> None:
         if {"-h", "--help"} & set(own):
             print(importlib.import_module("sbs_sim.nodes.usage").text(name), end="")
             return
+        wait_for_no_reader()  # before anything takes hold of the standard output
         module = importlib.import_module(f"sbs_sim.nodes.{name}")
     except ModuleNotFoundError as error:
         if not (error.name or "").partition(".")[0].endswith(ROS):

@@ -18,19 +18,23 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
-from ros_harness import DOMAINS, EXECUTABLES, environment
+from ros_harness import DOMAINS, EXECUTABLES, Client, environment
+
+from sbs_msgs.msg import BodyState
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-LONGEST_FLIGHT = 4.0  # s from our first line to the interruption; a start takes half of it
-LONGEST_START = 60.0  # s until our first line runs
+LONGEST_FLIGHT = 1.0  # s from the beginning of the flight to the interruption
+STARTING = 0.3  # share of those that are interrupted while they start
+LONGEST_START = 4.0  # s from our first line to the interruption of those
+PATIENCE = 60.0  # s until our first line runs
 
 
 class Simulator:
     """A simulator in a namespace."""
 
     def __init__(self, number: int, domain: int, folder: Path) -> None:
-        self.log = folder / f"{number}.log"
-        command = [sys.executable, str(EXECUTABLES / "simulator"), "--ros-args", "-r", f"__ns:=/number_{number}"]
+        self.log, self.namespace = folder / f"{number}.log", f"/number_{number}"
+        command = [sys.executable, str(EXECUTABLES / "simulator"), "--ros-args", "-r", f"__ns:={self.namespace}"]
         # so that SIGABRT prints what every thread does
         own = {**environment(domain, folder), "PYTHONFAULTHANDLER": "1"}
         with self.log.open("w") as out:
@@ -38,7 +42,7 @@ class Simulator:
 
     def await_first_line(self) -> None:
         """Wait until it handles signals itself: before that the start is Python's own."""
-        end = time.monotonic() + LONGEST_START
+        end = time.monotonic() + PATIENCE
         while time.monotonic() < end and self.process.poll() is None:
             status = Path(f"/proc/{self.process.pid}/status").read_text()
             if int(status.split("SigCgt:")[1].split()[0], 16) >> (signal.SIGTERM - 1) & 1:
@@ -54,6 +58,20 @@ class Simulator:
         self.process.send_signal(signal.SIGABRT)
         self.process.wait()
         return f"{seen}\n{self.log.read_text()}"
+
+
+def await_moment(chance: random.Random, domain: int, pair: list[Simulator]) -> None:
+    """Wait for a random moment of the start, or for one shortly after the first state of the flight."""
+    for simulator in pair:
+        simulator.await_first_line()
+    if chance.random() < STARTING:
+        time.sleep(chance.uniform(0.0, LONGEST_START))
+        return
+    client = Client(domain)
+    states = client.watch(f"{chance.choice(pair).namespace}/state", BodyState)
+    client.until(lambda: states, "a state")
+    client.close()
+    time.sleep(chance.choice((0.0, 0.0, chance.uniform(0.0, LONGEST_FLIGHT))))
 
 
 def interrupt(chance: random.Random, simulator: Simulator) -> None:
@@ -77,9 +95,7 @@ def main() -> int:
         for first in range(0, options.count, 2):
             domain = next(DOMAINS)
             pair = [Simulator(number, domain, folder) for number in range(first, min(first + 2, options.count))]
-            for simulator in pair:
-                simulator.await_first_line()
-            time.sleep(chance.uniform(0.0, LONGEST_FLIGHT))
+            await_moment(chance, domain, pair)
             for simulator in pair:
                 interrupt(chance, simulator)
             begin = time.monotonic()

@@ -171,9 +171,9 @@ def topic_rows() -> list[list[str]]:
 
 TOPICS = """
 Units are SI, angles radians. Names are relative, so namespaces and remaps work. Nodes of others with `use_sim_time`
-listen to `/clock` wherever they are: in a namespace they need `-r /clock:=/left/clock`. Besides the nodes of this table,
-`cockpit` listens to what it draws and steers by `controls`, `replay` publishes what its log holds, and everybody may
-publish `controls` or, without the mixer, `swashplate`.
+listen to `/clock` wherever they are: in a namespace they need `-r /clock:=/left/clock`. Besides the nodes of this
+table, `cockpit` listens to what it draws and steers by `controls`, `replay` publishes what its log holds, and everybody
+may publish `controls` or, without the mixer, `swashplate`.
 """
 
 

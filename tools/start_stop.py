@@ -33,10 +33,11 @@ class Simulator:
     """A simulator in a namespace."""
 
     def __init__(self, number: int, domain: int, folder: Path) -> None:
+        self.number = number
         self.log, self.namespace = folder / f"{number}.log", f"/number_{number}"
         command = [sys.executable, str(EXECUTABLES / "simulator"), "--ros-args", "-r", f"__ns:={self.namespace}"]
         # so that SIGABRT prints what every thread does
-        own = {**environment(domain, folder), "PYTHONFAULTHANDLER": "1"}
+        own = {**environment(domain, folder / str(number)), "PYTHONFAULTHANDLER": "1"}
         with self.log.open("w") as out:
             self.process = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT, env=own, cwd=folder)
 
@@ -111,7 +112,7 @@ def main() -> int:
                     wrong += 1
                     print(f"exit code {simulator.process.returncode}:\n{simulator.log.read_text()}", flush=True)
                 simulator.log.unlink()
-            shutil.rmtree(folder / "bags", ignore_errors=True)
+                shutil.rmtree(folder / str(simulator.number), ignore_errors=True)
     print(f"{options.count} started, {hanging} did not end, {wrong} ended wrongly; the slowest took {slowest:.1f} s")
     return int(bool(hanging or wrong))
 

@@ -80,7 +80,7 @@ class Analysis(Component):
             response.trim, response.warnings = trim_message(self._aircraft, point), point.warnings
             self._trim_point.publish(response.trim, self._now())
 
-        return self.answer(response, act, "trimmed")
+        return self.answer(response, act, "trimmed", request)
 
     def _on_linearize(self, request: Linearize.Request, response: Linearize.Response) -> Linearize.Response:
         def act() -> None:
@@ -91,7 +91,7 @@ class Analysis(Component):
                 done.append(f"growing rotor modes: {growing_rotor_modes_text(model, self._aircraft)}")
 
         done = ["linearized"]
-        response = self.answer(response, act, done[0])
+        response = self.answer(response, act, done[0], request)
         if response.success:
             response.message = "; ".join(done)
         return response
@@ -114,7 +114,7 @@ class Analysis(Component):
             finally:
                 self._turn.release()
 
-        self.answer(result, act, "")
+        self.answer(result, act, "", goal.request)
         if result.success:
             total, found = len(result.points), sum(point.success for point in result.points)
             result.success = visited == total

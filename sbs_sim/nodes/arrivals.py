@@ -10,9 +10,11 @@ from rclpy.serialization import serialize_message
 
 from sbs_sim.errors import SimulationError
 from sbs_sim.nodes.host import Log, Refusals
+from sbs_sim.nodes.number_fields import check_numbers, scalars
 
 ODD_AGE = 0.5  # s that a stamp may be away from the simulation time without a word
 NEW_CLOCK = 0.5  # s of wall time without an accepted command after which earlier stamps are those of another clock
+FAINT = 1e-200  # in size: what has come so near to zero has not been an integer
 SHOWN = 4  # publishers that are named
 
 
@@ -48,6 +50,12 @@ class Arrivals(Refusals):
         self._stamp = 0
         self._accepted_at = 0.0
         self._oddest = 0.0
+        self._decaying: frozenset[str] = frozenset()
+
+    def check(self, message: Any) -> None:
+        """Raise SimulationError for a command that came too late, or with a number that was none when it was sent."""
+        self.check_order(message)
+        check_numbers(message, self._decaying)
 
     def check_order(self, message: Any) -> None:
         """Raise SimulationError for a command that is stamped earlier than the one in force."""
@@ -58,6 +66,7 @@ class Arrivals(Refusals):
 
     def accept(self, message: Any, now: float) -> None:
         """Record a command that is taken at a simulation time [s]."""
+        self._decaying = frozenset(name for name, value in scalars(message) if 0.0 < abs(value) < FAINT)
         stamp = _nanoseconds(message)
         if stamp:
             self._stamp, self._accepted_at = stamp, time.monotonic()

@@ -104,7 +104,7 @@ class ControlMixer(Component):
     def _on_controls(self, message: Controls) -> None:
         self._follow_resets()
         try:
-            self._arrivals.check_order(message)
+            self._arrivals.check(message)
             self._mixer.set_target(controls_array(message))
             if self._loop is not None and self._mixer.rests:
                 self._mixer.stand(self._loop.swashplate())

@@ -27,6 +27,7 @@ from sbs_sim.command_line import suggestion
 from sbs_sim.errors import SbsError
 from sbs_sim.nodes.confinement import check_confinement, keep_to_this_machine
 from sbs_sim.nodes.executables import ignore_interruptions, when_interrupted
+from sbs_sim.nodes.number_fields import check_numbers
 
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # What ROS raises where a name, a parameter or a setting of the environment makes a node impossible.
@@ -145,9 +146,10 @@ class Component(Node):
     def finish(self) -> None:
         """Bring to an end what must not be lost; called once, after `stop` and after the node's thread."""
 
-    def answer(self, response: Any, act: Callable[[], Any], done: str) -> Any:
+    def answer(self, response: Any, act: Callable[[], Any], done: str, request: Any) -> Any:
         """Carry out a request and say how it went; an error changes nothing and is told."""
         try:
+            check_numbers(request)
             act()
         except SbsError as error:
             response.success, response.message = False, str(error)

@@ -22,6 +22,7 @@ from sbs_sim.nodes.conversions import (
     point_array,
     to_seconds,
 )
+from sbs_sim.nodes.number_fields import check_numbers
 from sbs_sim.pilot.hover_hold import HoverModel, checked_body
 
 Array = NDArray[np.float64]
@@ -76,6 +77,7 @@ def to_target(message: PoseStamped) -> tuple[Array, float]:
     frame = message.header.frame_id
     if frame not in (FRAME_NED, FRAME_ODOM):
         raise PilotError(f"frame_id = {frame!r}: allowed are {FRAME_NED!r}, {FRAME_ODOM!r}")
+    check_numbers(message.pose, error=PilotError)
     place, turn = message.pose.position, message.pose.orientation
     for name, part in (("position", place), ("orientation", turn)):
         for axis in part.get_fields_and_field_types():

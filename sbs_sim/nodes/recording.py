@@ -162,7 +162,7 @@ class Recording(Component):
 
     def _on_record(self, request: Record.Request, response: Record.Response) -> Record.Response:
         response.path = "" if request.record else self.path
-        self.answer(response, lambda: self._act(request, response), "")
+        self.answer(response, lambda: self._act(request, response), "", request)
         if response.success:
             response.message = f"recording {response.path}" if request.record else f"recorded {response.path}"
         return response

@@ -135,7 +135,7 @@ class Simulator(Component):
 
     def _on_swashplate(self, message: SwashplateArray) -> None:
         try:
-            self._arrivals.check_order(message)
+            self._arrivals.check(message)
             self.loop.command(swashplate_array(message))
         except SbsError as error:
             self._arrivals.add(error)
@@ -144,13 +144,13 @@ class Simulator(Component):
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         done = "paused" if request.data else "playing"
-        return self.answer(response, lambda: self.loop.pause(request.data), done)
+        return self.answer(response, lambda: self.loop.pause(request.data), done, request)
 
     def _on_step(self, request: Step.Request, response: Step.Response) -> Step.Response:
         def step() -> None:
             response.sim_time = self.loop.step(request.ticks)
 
-        return self.answer(response, step, f"{request.ticks} ticks")
+        return self.answer(response, step, f"{request.ticks} ticks", request)
 
     def _on_reset(self, request: Reset.Request, response: Reset.Response) -> Reset.Response:
         def reset() -> None:
@@ -164,10 +164,13 @@ class Simulator(Component):
             state = trimmed_state(self.aircraft, point, position, request.heading, wind)
             self.loop.reset(state, point.swashplate)
 
-        return self.answer(response, reset, "reset")
+        return self.answer(response, reset, "reset", request)
 
     def _on_set_wind(self, request: SetWind.Request, response: SetWind.Response) -> SetWind.Response:
-        return self.answer(response, lambda: self.loop.set_wind(lambda now: wind_of(request, now)), "wind set")
+        def set_wind() -> None:
+            self.loop.set_wind(lambda now: wind_of(request, now))
+
+        return self.answer(response, set_wind, "wind set", request)
 
     def _on_parameters(self, parameters: list[Any]) -> SetParametersResult:
         """Take over what is set; rclpy has found all that came together to be within its range."""

@@ -169,6 +169,29 @@ def test_processor_without_wheels(clone):
     assert_one_line(clone.call("simulator"), "aarch64", "remedy: install ROS 2 Jazzy")
 
 
+STRANGE = ("a&b", "a|b", "a'b", "a(b)", "a:b", "a,b", "a;b", 'a"b', "a$b", "a\nb", "a`b", "a#b", "a%b", "a[b]", "Büro")
+
+
+@pytest.mark.parametrize("name", STRANGE)
+def test_a_path_with_which_no_build_succeeds(tmp_path, name):
+    """Nothing is set up that would only fail in the end, and an environment that was moved there is not spoilt."""
+    clone = Clone(tmp_path / name / "sbs_sim", tmp_path / "home", tmp_path / "tools")
+    script = clone.folder / ".venv" / "bin" / "pytest"
+    script.parent.mkdir(parents=True)
+    script.write_text("#!/before/.venv/bin/python\n")
+    result = clone.call("simulator")
+    assert result.returncode == 1
+    assert "in its name, with which CMake or colcon fails; remedy: move it" in result.stderr
+    assert script.read_text() == "#!/before/.venv/bin/python\n"
+
+
+@pytest.mark.parametrize("name", ["a b", "a+b=c@d~e-f_g.h"])
+def test_other_paths_are_taken(tmp_path, name):
+    clone = Clone(tmp_path / name / "sbs_sim", tmp_path / "home", tmp_path / "tools")
+    clone.remove("g++")  # what is looked for next
+    assert_one_line(clone.call("simulator"), "missing: g++;")
+
+
 @pytest.mark.parametrize("answer", ["exit 1", "echo glibc 2.27"])
 def test_c_library_without_wheels(clone, answer):
     clone.fake("getconf", answer)

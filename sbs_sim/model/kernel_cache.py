@@ -4,15 +4,18 @@ numba unpickles what it finds there and executes it. Who could put a file into s
 its place, could have anything executed in the name of the user.
 """
 
+import contextlib
 import functools
 import hashlib
 import logging
 import os
 import stat
+import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 HERE = Path(os.path.realpath(__file__)).parent
+BESIDE = HERE / "__pycache__"
 EVERYBODY = "everybody"
 CLOSED = 0o077  # bits of a mode that are off where nobody but the owner gets in
 
@@ -26,6 +29,9 @@ def cache_folder() -> Path | None:
     """
     name = f"kernels-{source_digest()}"
     folder, refusals = _first_trusted([(base / name, judged) for base, judged in _places()])
+    beside = BESIDE / name
+    if folder not in (None, beside) and "NUMBA_CACHE_DIR" not in os.environ:
+        _take_over(beside, folder)
     if refusals or folder is None:
         kept = f"kept in {folder}" if folder else "compiled anew by every process, which takes up to a minute"
         why = "; ".join(refusals) or "no folder for them can be written"
@@ -43,7 +49,7 @@ def _places() -> Iterator[tuple[Path, bool]]:
     """
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         yield Path(chosen) / "sbs_sim", True
-    yield HERE / "__pycache__", False
+    yield BESIDE, False
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     if os.path.isabs(home):  # others are to be ignored, XDG Base Directory Specification
         yield Path(home) / "sbs_sim", True
@@ -64,6 +70,26 @@ def _first_trusted(places: Iterable[tuple[Path, bool]]) -> tuple[Path | None, li
         elif os.access(folder, os.W_OK | os.X_OK):
             return folder, refusals
     return None, refusals
+
+
+def _take_over(finished: Path, folder: Path) -> None:
+    """Copy machine code that is kept where nobody may write: numba takes nothing from such a folder.
+
+    What cannot be copied, or is not to be trusted, is compiled.
+    """
+    with contextlib.suppress(OSError):
+        if refusal(finished, [finished.parent], (HERE,)):
+            return
+        for index in finished.glob("*/*.nbi"):
+            target = folder / index.parent.name
+            if (target / index.name).exists():
+                continue
+            target.mkdir(mode=0o700, exist_ok=True)
+            # the index last, and each at once: what it names is whole
+            for path in (*index.parent.glob(f"{index.stem}.*.nbc"), index):
+                with tempfile.NamedTemporaryFile(dir=target, delete=False) as copy:
+                    copy.write(path.read_bytes())
+                os.replace(copy.name, target / path.name)
 
 
 def _make(folder: Path) -> None:

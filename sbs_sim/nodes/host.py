@@ -27,7 +27,7 @@ from sbs_sim.command_line import suggestion
 from sbs_sim.errors import SbsError
 from sbs_sim.nodes.confinement import check_confinement, keep_to_this_machine
 from sbs_sim.nodes.executables import ignore_interruptions, when_interrupted
-from sbs_sim.nodes.number_fields import check_numbers
+from sbs_sim.nodes.number_fields import check_numbers, hint
 
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # What ROS raises where a name, a parameter or a setting of the environment makes a node impossible.
@@ -152,7 +152,7 @@ class Component(Node):
             check_numbers(request)
             act()
         except SbsError as error:
-            response.success, response.message = False, str(error)
+            response.success, response.message = False, f"{error}{hint(request)}"
         except Exception as error:  # an error of ours must not end the flight of others
             self.get_logger().error(f"internal error: {traceback.format_exc()}")
             response.success, response.message = False, f"internal error, see the log: {error!r}"

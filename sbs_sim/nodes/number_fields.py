@@ -28,10 +28,13 @@ def check_numbers(message: Any, decaying: Collection[str] = (), error: type[SbsE
         Of the error.
     """
     for name, value in scalars(message):
-        if math.isnan(value):
-            raise error(f"{name} = nan: allowed are finite numbers; {CAUSE}")
         if 0.0 < abs(value) < LEAST and name not in decaying:
             raise error(f"{name} = {value}: allowed are 0 and what is at least {LEAST:.3g} in size; {CAUSE}")
+
+
+def hint(message: Any) -> str:
+    """What to add to the words that refuse a message: where a scalar is no number, that may be the cause."""
+    return f"; {CAUSE}" if any(math.isnan(value) for _, value in scalars(message)) else ""
 
 
 def scalars(message: Any, prefix: str = "") -> Iterator[tuple[str, float]]:

@@ -12,6 +12,7 @@ from sbs_sim import Aircraft, linearize, trim
 from sbs_sim.analysis.linearize import difference_steps
 from sbs_sim.analysis.sweep import sweep
 from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
@@ -36,7 +37,7 @@ def trim_rows(aircraft: Aircraft, timed: Timed) -> list[Row]:
         seconds, note = timed(lambda speed=speed: trim(aircraft, airspeed=speed), 21)
         rows.append((f"trim {name}", 1e3 * seconds, "ms", note))
         problem, condition = TrimProblem(aircraft, True, True, 12), TrimCondition(speed)
-        guess = problem.first_guess(0.01)
+        guess = MomentumTheory(problem).guess(condition)
 
         def generic(problem: TrimProblem = problem, condition: TrimCondition = condition, guess: Any = guess) -> Any:
             return root(lambda values: problem.residual(condition, values), guess, tol=1e-12)

@@ -115,3 +115,35 @@ def test_what_rounding_leaves_is_taken_for_a_root_and_no_more(jump, converged):
     solution = newton(lambda values: values - 0.3 + np.where(values >= 0.3, jump, -jump), one(0.0))
     assert solution.converged == converged
     assert solution.values[0] == pytest.approx(0.3, abs=1e-8)
+
+
+def test_a_direction_that_the_equations_leave_open_is_not_gone():
+    """An unknown that moves nothing, and two that do the same: the smallest step of all."""
+    solution = newton(lambda v: np.array([v[0] - 0.3, 0.0 * v[1]]), np.array([0.0, 0.2]))
+    assert solution.converged
+    np.testing.assert_allclose(solution.values, [0.3, 0.2], atol=1e-10)
+    solution = newton(lambda v: np.array([v[0] + v[1] - 0.3, 2.0 * (v[0] + v[1]) - 0.6]), np.zeros(2))
+    assert solution.converged
+    np.testing.assert_allclose(solution.values, [0.15, 0.15], atol=1e-10)
+
+
+def test_open_but_for_rounding_is_open():
+    """The slope of an unknown that moves nothing, as differences have it."""
+    matrix = np.array([[1.0, 1e-14], [0.0, 3e-15]])
+    solution = newton(lambda v: np.array([v[0] - 0.3, 1e-3 * (v[0] - 0.3)]), np.zeros(2), lambda v: matrix)
+    assert solution.converged
+    assert abs(solution.values[1]) < 1e-10
+
+
+def test_what_rounding_lessens_again_and_again_is_a_root():
+    """Every step leaves nine tenths: far from the tolerance of a hundred times less, no step would be enough."""
+    left = Counted(lambda values: 0.0)
+
+    def equations(values):
+        left(values)
+        return values - 0.3 + 8e-11 * 0.98**left.calls
+
+    solution = newton(equations, one(0.0))
+    assert solution.converged
+    assert solution.iterations < 10
+    assert solution.values[0] == pytest.approx(0.3, abs=1e-9)

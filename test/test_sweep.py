@@ -133,7 +133,7 @@ def test_failed_points_stay_in_their_places(masses):
     assert [point.error is None for point in masses.points] == [False, True, True, True, False]
     assert masses.failed == (masses.points[0], masses.points[4])
     assert masses.points[0].error == "body.mass = 0.5: allowed is > 0.9678, the mass of all blades"
-    assert masses.points[4].error.startswith("no trim after ")
+    assert masses.points[4].error.startswith("no trim: the rotors cannot carry more than ")
     assert masses.points[4].trim is None
     assert masses.points[4].model is None
 

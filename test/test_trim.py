@@ -8,6 +8,7 @@ from helpers import Model, aircraft_data, build, linear_airfoil, mirrored_data
 
 from sbs_sim import simulate, trim
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
 from sbs_sim.errors import TrimError
 from sbs_sim.model import params as P
@@ -52,7 +53,8 @@ def disc_area(rotor):
 def test_jacobian_of_the_equations_is_their_difference(sbs, name, fidelity):
     """All unknowns, away from the solution; as many azimuths as the Jacobian takes at most."""
     problem, condition = TrimProblem(sbs, *fidelity, 4), TrimCondition(**CONDITIONS[name])
-    unknowns = problem.first_guess(0.0) + 0.02 * np.random.default_rng(1).standard_normal(len(problem.equations))
+    guess = MomentumTheory(problem).guess(condition)
+    unknowns = guess + 0.02 * np.random.default_rng(1).standard_normal(len(guess))
     found, step = problem.jacobian(condition, unknowns), 1e-6
     for i in range(len(unknowns)):
         moved = step * np.eye(len(unknowns))[i]

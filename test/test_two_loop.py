@@ -11,6 +11,7 @@ from plain_model import make_instant, multiblade_matrix, plain_derivative, rando
 from sbs_sim import trim
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import two_loop
+from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
 from sbs_sim.analysis.two_loop import solve_by_two_loops
 from sbs_sim.errors import TrimError
@@ -202,12 +203,16 @@ def test_hover_is_newtons(name, lead_lag, cyclic_inflow):
 
 
 @pytest.mark.parametrize("climb", [-2.0, 2.0, 5.0])
-def test_vertical_flight_is_newtons(sbs, climb):
-    """The first guess is hover's, so that here the inner loop has to work: it halves, roughly, the error in inflow."""
-    found = trim(sbs, climb_rate=climb, method="two_loop")
-    assert_same_trim(found, trim(sbs, climb_rate=climb))
+def test_vertical_flight_is_newtons(sbs, hover, climb):
+    """Momentum theory has the right inflow; from that of hover the inner loop halves, roughly, the error in it."""
+    found, expected = trim(sbs, climb_rate=climb, method="two_loop"), trim(sbs, climb_rate=climb)
+    assert_same_trim(found, expected)
     assert found.iterations <= 5
-    assert 20 < found.inner_iterations < 50
+    assert found.inner_iterations <= 8
+    if abs(climb) < 3.0:  # farther from hover the gain of -5 may meet more than rounding
+        found = trim(sbs, climb_rate=climb, method="two_loop", guess=hover)
+        assert_same_trim(found, expected)
+        assert 20 < found.inner_iterations < 50
 
 
 @pytest.mark.parametrize("rotors", [[{"blades": 4}, {"blades": 4}], [{"blades": 5}, {"blades": 5}]])
@@ -263,15 +268,15 @@ def failure_of(error, aircraft):
     [{"airspeed": 10.0}, {"airspeed": 20.0}, {"airspeed": 10.0, "turn_rate": 0.3}, {"airspeed": 4.0, "sideslip": 1.5}],
 )
 def test_flight_away_from_hover_fails_and_says_how(name, condition):
-    """Loops are done, the coordinates still change by much, and the complete equations are far from fulfilled."""
+    """Loops are done, the complete equations are far from fulfilled: the coordinates still change by much, or stay."""
     aircraft = build(name)
     with pytest.raises(TrimError) as error:
         trim(aircraft, method="two_loop", **condition)
     parts = failure_of(error.value, aircraft)
     assert int(parts["outer"]) >= 1
     assert int(parts["inner"]) >= 1
-    assert float(parts["change"]) > 0.1
-    assert error.value.residual > 0.05
+    assert float(parts["change"]) > 0.1 or parts["reason"] == "the loops come to rest off trim"
+    assert error.value.residual > 10 * two_loop.LARGEST_RESIDUAL
 
 
 def test_newton_finds_what_the_loops_do_not(sbs):
@@ -298,7 +303,7 @@ def test_outer_loop_drives_away_from_a_hover_that_is_not_symmetric(sbs, hover):
     ("limit", "value", "condition", "reason"),
     [
         ("MOST_OUTER", 2, {}, "the outer loop does not end"),
-        ("MOST_INNER", 3, {"climb_rate": 2.0}, "the inner loop does not end"),
+        ("MOST_INNER", 3, {"climb_rate": 2.0, "guess": [0.15, 0.0, 0.0, 0.0]}, "the inner loop does not end"),
         ("LARGEST_RESIDUAL", 1e-4, {"airspeed": 10.0, "cyclic_inflow": False}, "the loops come to rest off trim"),
     ],
 )
@@ -309,14 +314,15 @@ def test_every_end_is_told(sbs, monkeypatch, limit, value, condition, reason):
     assert failure_of(error.value, sbs)["reason"] == reason
 
 
-def test_controls_that_do_nothing_are_a_failure():
-    """A differential that no swashplate follows leaves a singular system."""
+def test_a_control_that_does_nothing_is_missed_where_it_is_needed():
+    """A differential that no swashplate follows: straight flight of a symmetric aircraft needs none, others do."""
     data = aircraft_data()
     for rotor in data["rotors"]:
         rotor["mixing"]["longitudinal_cyclic"].pop("differential_longitudinal_cyclic")
     aircraft = Aircraft.from_dict(data)
+    np.testing.assert_allclose(trim(aircraft, method="two_loop").controls, trim(aircraft).controls, atol=1e-7)
     with pytest.raises(TrimError) as error:
-        trim(aircraft, 5.0, method="two_loop")
+        trim(aircraft, 5.0, sideslip=1.0, method="two_loop")
     assert failure_of(error.value, aircraft)["reason"] == "no controls balance the body"
 
 
@@ -329,7 +335,7 @@ def test_what_cannot_hover_is_a_failure():
 
 def test_numbers_that_are_not_finite_are_a_failure(sbs):
     problem = TrimProblem(sbs, True, True, 12)
-    start = problem.first_guess(0.01)
+    start = MomentumTheory(problem).guess(TrimCondition())
     start[2] = math.nan
     with pytest.raises(TrimError) as error:
         solve_by_two_loops(problem, TrimCondition(), start)

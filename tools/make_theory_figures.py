@@ -5,6 +5,7 @@
 writes docs/images/*.svg, or other files (png) into another folder, always with the same bytes for the same matplotlib.
 """
 
+import itertools
 import math
 import sys
 from collections.abc import Sequence
@@ -543,31 +544,32 @@ def box(axes: Axes, centre: Point, size: Point, text: str, color: str = PALE) ->
 
 
 def _newton_flow(axes: Axes) -> None:
-    box(axes, (5, 12.2), (7.6, 1.0), "first guess: momentum theory,\nidle disc loading 0.01, 0.1, 1")
-    box(axes, (5, 10.4), (7.6, 1.0), "Newton at hover")
-    box(axes, (5, 8.6), (7.6, 1.0), "Newton at the wanted condition,\nfrom hover")
-    box(axes, (2.4, 6.2), (3.4, 1.2), "trim within\nthe limits:\ndone", "#dbe9dd")
-    box(axes, (6.9, 6.2), (5.0, 1.2), "walk: conditions between,\neach guess extrapolated\nfrom the two before")
-    box(axes, (6.9, 4.2), (5.0, 1.0), "no solution: step / 2;\nsolution: step x 1.5")
-    box(axes, (6.9, 2.5), (5.0, 1.0), "end reached: done", "#dbe9dd")
+    stages = (
+        ("first guess: momentum and\nblade-element theory", 12.2),
+        ("Newton at hover, and from it\nat the wanted condition", 10.6),
+        ("path from hover: step / 2 where there\nis no solution, else x 1.5", 9.0),
+        ("Newton from the first guess\nat the condition itself", 7.4),
+        ("path of growing weight and drag", 5.8),
+        ("paths from other speeds", 4.2),
+    )
+    for text, height in stages:
+        box(axes, (3.9, height), (6.6, 1.0), text)
+    for (_, upper), (_, lower) in itertools.pairwise(stages):
+        arrow(axes, (3.9, upper - 0.5), (3.9, lower + 0.5))
+    box(axes, (8.75, 7.4), (2.3, 1.9), "within the\nlimits, no\nstalled rotor:\ndone", "#dbe9dd")
+    line(axes, [(8.75, 4.2), (8.75, 6.45)], INK, 1.2)
+    line(axes, [(8.75, 10.6), (8.75, 8.35)], INK, 1.2)
+    for _, height in stages[1:]:
+        line(axes, [(7.2, height), (8.75 if height != 7.4 else 7.6, height)], INK, 1.2)
     box(
         axes,
-        (5, 0.75),
-        (8.6, 1.0),
-        "step below 1/64: the direct solution if there\nis one, else an error naming the place",
+        (5, 2.1),
+        (8.6, 1.2),
+        "the best of what was found, else an error\nthat says what stops the trim",
         "#f3dfd6",
     )
-    arrow(axes, (5, 11.7), (5, 10.9))
-    arrow(axes, (5, 9.9), (5, 9.1))
-    arrow(axes, (3.4, 8.1), (2.6, 6.8))
-    arrow(axes, (6.4, 8.1), (6.9, 6.8))
-    note(axes, (8.05, 7.45), "beyond limits,\nor no solution", FAINT, 8)
-    arrow(axes, (6.9, 5.6), (6.9, 4.7))
-    arrow(axes, (6.9, 3.7), (6.9, 3.0))
-    line(axes, [(9.4, 4.2), (9.75, 4.2), (9.75, 6.2)], INK, 1.2)
-    arrow(axes, (9.75, 6.2), (9.4, 6.2))
-    line(axes, [(4.4, 4.2), (3.6, 4.2)], INK, 1.2)
-    arrow(axes, (3.6, 4.2), (3.6, 1.25))
+    arrow(axes, (3.9, 3.7), (3.9, 2.7))
+    note(axes, (5.6, 3.2), "nothing of that kind", FAINT, 8)
 
 
 def _loops_flow(axes: Axes) -> None:

@@ -11,6 +11,7 @@ Then one block for each method whose name holds the text.
 import math
 import sys
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,8 @@ import numpy as np
 from sbs_sim import Aircraft, linearize, simulate, trim
 from sbs_sim.analysis.floquet import floquet
 from sbs_sim.analysis.reproduce import undamped_sbs
-from sbs_sim.analysis.trim_problem import TrimProblem
+from sbs_sim.analysis.trim_guess import MomentumTheory
+from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
 from sbs_sim.analysis.two_loop import _TwoLoops
 from sbs_sim.errors import TrimError
 from sbs_sim.model.trigonometry import arctangent2
@@ -163,6 +165,20 @@ def exponents() -> None:
         print(f"  {speed:4.1f} m/s: azimuth_spread {spread:.1e}, exponents off by {share:.1e} of max(|pole|, 1 rad/s)")
 
 
+def guesses() -> None:
+    """First guess beside the hover that Newton's method finds from it, and steps to flights at speed."""
+    data = Path(__file__).resolve().parents[1] / "test" / "data"
+    for name in ("sbs", "sbs_paper", *(data / f"{file}.yaml" for file in ("tail_rotor", "tandem", "uh60a"))):
+        aircraft = Aircraft.load(name)
+        guess = MomentumTheory(TrimProblem(aircraft, True, True, 12)).guess(TrimCondition())
+        points = [trim(aircraft, speed) for speed in (0.0, 20.0)]
+        off = np.degrees(np.abs(guess[2:6] - points[0].controls)).max()
+        steps = " and ".join(str(point.iterations) for point in points)
+        print(f"  {Path(name).stem:10s} controls off by up to {off:.2f} deg; {steps} steps to hover and to 20 m/s")
+    steps = [trim(Aircraft.load("sbs"), speed).iterations for speed in range(1, 26)]
+    print(f"  sbs from 1 to 25 m/s: {min(steps)} to {max(steps)} steps in all")
+
+
 def two_loops() -> None:
     """The paper's nested loops beside Newton's method."""
     aircraft = undamped_sbs()
@@ -262,6 +278,7 @@ METHODS: dict[str, Callable[[], None]] = {
     "azimuth count": azimuths,
     "difference steps": differences,
     "floquet": exponents,
+    "first guess": guesses,
     "two loops": two_loops,
     "outer gains": outer_gains,
     "coupling": couplings,

@@ -61,7 +61,9 @@ MODULES: dict[str, tuple[str, ...]] = {
     "analysis/linearize": ("test_linearize.py",),
     "analysis/trim_problem": ("test_trim.py", "test_two_loop.py"),
     "analysis/modes": ("test_modes.py",),
-    "analysis/trim": ("test_trim.py", "test_two_loop.py"),
+    "analysis/trim": ("test_trim.py", "test_trim_search.py", "test_two_loop.py"),
+    "analysis/trim_guess": ("test_trim_search.py",),
+    "analysis/trim_search": ("test_trim_search.py", "test_trim.py"),
     "analysis/newton": ("test_newton.py",),
     "analysis/floquet": ("test_floquet.py",),
 }

@@ -21,7 +21,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import export
 from sbs_sim.analysis.control_effects import ControlEffect, control_effects
 from sbs_sim.analysis.modes import Mode, modes
-from sbs_sim.analysis.trim import TrimPoint, trim
+from sbs_sim.analysis.trim import Guess, TrimPoint, trim
 from sbs_sim.content import ByContent
 from sbs_sim.errors import LinearizationError
 from sbs_sim.model import params as P
@@ -250,12 +250,13 @@ def linearize(
     method: str = "averaged",
     step_scale: float = 1.0,
     point: TrimPoint | None = None,
+    guess: Guess | None = None,
 ) -> LinearModel:
     """Linearize an aircraft about a trimmed flight.
 
     Parameters
     ----------
-    aircraft, airspeed, climb_rate, sideslip, turn_rate, lead_lag, cyclic_inflow, azimuth_count :
+    aircraft, airspeed, climb_rate, sideslip, turn_rate, lead_lag, cyclic_inflow, azimuth_count, guess :
         See `sbs_sim.trim`, which has the defaults.
     method : str
         "averaged" or "paper".
@@ -287,6 +288,7 @@ def linearize(
         "lead_lag": lead_lag,
         "cyclic_inflow": cyclic_inflow,
         "azimuth_count": azimuth_count,
+        "guess": guess,
     }
     given = {name: value for name, value in given.items() if value is not None}
     if point is None:

@@ -20,6 +20,7 @@ TOLERANCE = 1e-11  # of the largest residual, which is to be scaled to the order
 MOST_ITERATIONS = 30
 DIFFERENCE_STEP = 1e-6
 GOOD_ENOUGH = 0.1  # a step that leaves less of the residual is followed by another with the same Jacobian
+OPEN = 1e-10  # of the largest singular value: directions in which differences of 1e-6 cannot see a slope
 LARGEST_UNKNOWN = math.pi / 2  # angles and inflow ratios beyond it make no sense
 
 
@@ -62,10 +63,7 @@ def newton(equations: Equations, start: Array, jacobian: Equations | None = None
         fresh = matrix is None
         if matrix is None:
             matrix = slope(values)
-        try:
-            step = np.asarray(np.linalg.solve(matrix, residual), dtype=np.float64)
-        except np.linalg.LinAlgError:
-            break
+        step = _step(matrix, residual)
         better = _descend(equations, values, step, residual, 8 if fresh else 1)
         if better is None and not fresh:
             matrix = None
@@ -74,10 +72,24 @@ def newton(equations: Equations, start: Array, jacobian: Equations | None = None
             if size < 100 * TOLERANCE:  # rounding has stopped it, not the equations
                 return Solution(values, residual, iteration, True)
             break
-        if np.abs(better[1]).max() > GOOD_ENOUGH * size:
+        left = float(np.abs(better[1]).max())
+        if left > 0.5 * size and size < 100 * TOLERANCE:  # and rounding again
+            return Solution(*better, iteration + 1, True)
+        if left > GOOD_ENOUGH * size:
             matrix = None
         values, residual = better
     return Solution(values, residual, iteration + 1, False)
+
+
+def _step(matrix: Array, residual: Array) -> Array:
+    """Newton's step; the smallest of all where the equations leave a direction open, which then moves nothing."""
+    try:
+        step = np.asarray(np.linalg.solve(matrix, residual), dtype=np.float64)
+        if np.abs(step).max() < LARGEST_UNKNOWN or not np.isfinite(matrix).all():
+            return step
+    except np.linalg.LinAlgError:
+        pass
+    return np.asarray(np.linalg.lstsq(matrix, residual, rcond=OPEN)[0], dtype=np.float64)
 
 
 def _jacobian(equations: Equations, values: Array) -> Array:

@@ -21,7 +21,7 @@ from sbs_sim.aircraft_values import unit_of
 from sbs_sim.analysis.export import model_to_dict, trim_to_dict
 from sbs_sim.analysis.linearize import LinearModel, linearize
 from sbs_sim.analysis.modes import Mode
-from sbs_sim.analysis.trim import TrimPoint, trim
+from sbs_sim.analysis.trim import Guess, TrimPoint, checked_guess, trim
 from sbs_sim.errors import AircraftError, SbsError, SweepError
 from sbs_sim.model import state as S
 from sbs_sim.parallel import checked_workers, compute
@@ -216,6 +216,7 @@ def sweep(
     lead_lag: bool = True,
     cyclic_inflow: bool = True,
     azimuth_count: int = 12,
+    guess: Guess | None = None,
     linear: bool = True,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -233,6 +234,8 @@ def sweep(
         Of the parameter, in any order; in the unit of `sbs_sim.trim` or of the aircraft file.
     airspeed, climb_rate, sideslip, turn_rate, lead_lag, cyclic_inflow, azimuth_count :
         See `sbs_sim.trim`, which has the defaults; the one that is the parameter must not be given.
+    guess : TrimPoint, array_like or tuple, optional
+        Where every point begins, see `sbs_sim.trim`.
     linear : bool
         False leaves the linear models out.
     workers : int, optional
@@ -256,10 +259,14 @@ def sweep(
     SweepError
         No values, one that is not finite, an unknown parameter, or one that is given a single value too; no whole
         number of workers.
+    TrimError
+        A guess that is none.
     ClusterError
         A cluster that cannot be reached, or that would not give the same.
     """
     checks.instance("aircraft", aircraft, Aircraft, SweepError)
+    if guess is not None:
+        checked_guess(aircraft.layout, guess)
     numbers = _checked_values(values)
     linear = checks.flag("linear", linear, SweepError)
     _check_parameter(aircraft, parameter)
@@ -277,7 +284,8 @@ def sweep(
         if progress is not None:
             progress(point, next(done), len(points))
 
-    calls = [(aircraft, parameter, {**condition, **fidelity}, linear, value) for value in numbers]
+    given = {**condition, **fidelity, "guess": guess}
+    calls = [(aircraft, parameter, given, linear, value) for value in numbers]
     compute(_solve, calls, keep, workers=count, cancelled=cancelled, dask=dask)
     return Sweep(parameter, tuple(points))
 

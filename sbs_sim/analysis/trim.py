@@ -1,25 +1,28 @@
 """Trim: the steady flight in which the averaged derivative vanishes (theory.md section 8).
 
-Newton's method solves all equations together, from hover or along a path of conditions from hover. The paper's two
+Newton's method solves all equations together; `sbs_sim.analysis.trim_search` has where it begins. The paper's two
 nested loops are there to compare with.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.newton import newton
+from sbs_sim.analysis.newton import LARGEST_UNKNOWN
+from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimPoint, TrimProblem
+from sbs_sim.analysis.trim_search import find
 from sbs_sim.analysis.two_loop import solve_by_two_loops
 from sbs_sim.errors import TrimError
+from sbs_sim.model import state as S
+from sbs_sim.model.state import StateLayout
 
 Array = NDArray[np.float64]
+Guess = TrimPoint | ArrayLike | tuple[ArrayLike, ArrayLike]
 
 METHODS = ("newton", "two_loop")
 LARGEST_AZIMUTH_COUNT = 1000
-IDLE_LOADINGS = (0.01, 0.1, 1.0)  # disc loadings to try on rotors that do not lift, as shares of that of those that do
-SMALLEST_PATH_STEP = 1.0 / 64.0
 
 
 def trim(
@@ -33,8 +36,12 @@ def trim(
     cyclic_inflow: bool = True,
     azimuth_count: int = 12,
     method: str = "newton",
+    guess: Guess | None = None,
 ) -> TrimPoint:
     """Trim an aircraft.
+
+    Of several trims the ordinary one is found: within the ranges of the controls if there is such a one, without
+    stalled rotors, on the branch of hover. A guess finds others.
 
     Parameters
     ----------
@@ -48,6 +55,10 @@ def trim(
     method : str
         "newton", or "two_loop": the paper's nested loops (section 2.2), which find hover, vertical flight, and of
         `sbs` straight flight up to 1.5 m/s, or without cyclic inflow 15 m/s; elsewhere they fail.
+    guess : TrimPoint, array_like or tuple, optional
+        Where to begin: a trim of an aircraft with as many rotors and blades; the four controls [rad]; or a tuple of
+        these and a linear state as in `TrimPoint.state`, of which attitude, flap, lag and inflow count. The trim to
+        which it leads is taken as it is; if it leads to none, the search goes on as without a guess.
 
     Returns
     -------
@@ -56,7 +67,8 @@ def trim(
     Raises
     ------
     TrimError
-        A value out of range, or no solution: message and attributes hold the last residual and its worst equation.
+        A value out of range, or no solution: the message says what stops it (rotors that cannot carry the weight,
+        a rotor that stalls, a control beyond its range), and with the attributes which equation is left with what.
     """
     checks.instance("aircraft", aircraft, Aircraft, TrimError)
     condition = TrimCondition(airspeed, climb_rate, sideslip, turn_rate)
@@ -65,93 +77,62 @@ def trim(
     azimuth_count = checks.whole("azimuth_count", azimuth_count, 1, LARGEST_AZIMUTH_COUNT, TrimError)
     checks.choice("method", method, METHODS, TrimError)
     problem = TrimProblem(aircraft, lead_lag, cyclic_inflow, azimuth_count)
+    start = None if guess is None else _start(problem, condition, checked_guess(aircraft.layout, guess))
     if method == "two_loop":
-        unknowns, outer, inner = solve_by_two_loops(problem, condition, problem.first_guess(IDLE_LOADINGS[0]))
+        start = MomentumTheory(problem).guess(condition) if start is None else start
+        unknowns, outer, inner = solve_by_two_loops(problem, condition, start)
         return problem.point(condition, unknowns, method, outer, inner)
-    unknowns, iterations = _follow_path(problem, condition)
+    unknowns, iterations = find(problem, condition, start)
     return problem.point(condition, unknowns, method, iterations)
 
 
-def _follow_path(problem: TrimProblem, condition: TrimCondition) -> tuple[Array, int]:
-    """Solve directly from hover, else along conditions between hover and the one wanted.
+def checked_guess(layout: StateLayout, guess: Guess) -> TrimPoint | tuple[Array, Array | None]:
+    """A trim, or controls, shape (4,), and a linear state, shape (n,), or None.
 
-    A direct solution beyond the limits of the controls may lie on another branch (a stalled rotor can carry the
-    aircraft too), so it counts only where the path, which keeps to the branch of hover, ends.
+    Raises
+    ------
+    TrimError
+        A guess that is none, has another shape or a value out of range.
     """
-    hover, iterations = _hover(problem, condition.scaled(0.0))
-    direct = None
-    try:
-        direct, more = _newton(problem, condition, hover)
-        iterations += more
-        if not problem.beyond_limits(direct):
-            return direct, iterations
-    except TrimError:
-        pass
-    try:
-        solution, more = _walk(problem, condition, hover)
-    except TrimError:
-        if direct is None:
-            raise
-        return direct, iterations
-    return solution, iterations + more
+    if isinstance(guess, TrimPoint):
+        if guess.state_names != layout.linear_names:
+            raise TrimError("guess: allowed is a trim of an aircraft with as many rotors and blades")
+        return guess
+    if isinstance(guess, tuple) and len(guess) == 2:
+        controls, state = guess
+        return (
+            _angles("guess[0]", controls, S.CONTROL_NAMES, S.CONTROL_NAMES),
+            _angles("guess[1]", state, layout.linear_names, _guessed(layout)),
+        )
+    return _angles("guess", guess, S.CONTROL_NAMES, S.CONTROL_NAMES), None
 
 
-def _hover(problem: TrimProblem, condition: TrimCondition) -> tuple[Array, int]:
-    """Solve hover from several guesses until one leads to a flight within the limits; else the first that was found."""
-    found: list[tuple[Array, int]] = []
-    failure: TrimError | None = None
-    for idle in IDLE_LOADINGS:
-        try:
-            found.append(_newton(problem, condition, problem.first_guess(idle)))
-        except TrimError as error:
-            failure = failure or error
-            continue
-        if not problem.beyond_limits(found[-1][0]):
-            return found[-1]
-    if found:
-        return found[0]
-    raise failure or TrimError("no guess for hover")
+def _guessed(layout: StateLayout) -> tuple[str, ...]:
+    """Names of the linear state that a guess tells."""
+    names = layout.linear_names
+    rotors = [name for name in names[S.LINEAR_BODY_SIZE :] if not S.part_of(name).is_rate]
+    return (names[S.LINEAR_THETA], names[S.LINEAR_PHI], *rotors)
 
 
-def _walk(problem: TrimProblem, condition: TrimCondition, hover: Array) -> tuple[Array, int]:
-    """Solve conditions between hover and the one wanted, each from the line through the two before."""
-    done, last, step = 0.0, 0.0, 0.25
-    before = solution = hover
-    iterations = 0
-    while done < 1.0:
-        share = min(1.0, done + step)
-        guess = solution if done == last else solution + (solution - before) * (share - done) / (done - last)
-        try:
-            found, more = _newton(problem, condition.scaled(share), guess)
-        except TrimError as error:
-            step /= 2
-            if step < SMALLEST_PATH_STEP:
-                reached = condition.scaled(done)
-                raise TrimError(
-                    f"{error}; the path from hover ends at airspeed {reached.airspeed:.3g} m/s,"
-                    f" climb_rate {reached.climb_rate:.3g} m/s, turn_rate {reached.turn_rate:.3g} rad/s",
-                    residual=error.residual,
-                    worst_equation=error.worst_equation,
-                ) from None
-            continue
-        before, solution, last, done = solution, found, done, share
-        iterations += more
-        step *= 1.5
-    return solution, iterations
+def _angles(what: str, values: ArrayLike, names: tuple[str, ...], checked: tuple[str, ...]) -> Array:
+    """Values by names, of which some are checked."""
+    found = checks.array(what, values, TrimError)
+    if found.shape != (len(names),):
+        raise TrimError(f"{what} has the shape {found.shape}: allowed are {len(names)} numbers, {names[0]} the first")
+    for name, value in zip(names, found.tolist(), strict=True):
+        if name in checked:
+            checks.number(f"{what}: {name}", value, -LARGEST_UNKNOWN, LARGEST_UNKNOWN, "rad", TrimError)
+    return found
 
 
-def _newton(problem: TrimProblem, condition: TrimCondition, start: Array) -> tuple[Array, int]:
-    """Solve one condition from a guess; TrimError if that fails."""
-    solution = newton(
-        lambda unknowns: problem.residual(condition, unknowns),
-        start,
-        lambda unknowns: problem.jacobian(condition, unknowns),
-    )
-    if solution.converged:
-        return solution.values, solution.iterations
-    size, worst = float(np.abs(solution.residual).max()), problem.worst_equation(solution.residual)
-    raise TrimError(
-        f"no trim after {solution.iterations} Newton iterations: residual {size:.3g} in {worst}",
-        residual=size,
-        worst_equation=worst,
-    )
+def _start(problem: TrimProblem, condition: TrimCondition, guess: TrimPoint | tuple[Array, Array | None]) -> Array:
+    """Unknowns of a checked guess."""
+    if isinstance(guess, TrimPoint):
+        controls, state = guess.controls, guess.state
+    else:
+        controls, given = guess
+        if given is None:
+            return MomentumTheory(problem).guess(condition, controls=controls)
+        state = given
+    x = problem.layout.from_linear(state)
+    return problem.unknowns(float(state[S.LINEAR_THETA]), float(state[S.LINEAR_PHI]), controls, x)

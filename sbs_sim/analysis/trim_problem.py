@@ -4,9 +4,10 @@ Unknowns are pitch and roll, the four controls, and of every rotor flap, lag and
 the six body accelerations, of the flap and lag accelerations and of the inflow rates.
 """
 
+import copy
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,14 @@ LIMITS = {
 BODY_STEP, ROTOR_STEP = 1e-5, 1e-6  # of the differences: m/s, rad/s, rad; rad, inflow ratio
 JACOBIAN_AZIMUTHS = 4  # enough to say where to go, the residual says where to stop
 ROTOR_LOADS = ("thrust", "torque", "power")
+BODY_BALANCES = (
+    "force ahead",
+    "force to the right",
+    "vertical force",
+    "rolling moment",
+    "pitching moment",
+    "yawing moment",
+)
 MOTION = [S.LINEAR_U, S.LINEAR_V, S.LINEAR_W, S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]
 
 
@@ -76,8 +85,22 @@ class TrimCondition:
             object.__setattr__(self, name, value)
 
     def scaled(self, share: float) -> "TrimCondition":
-        """Condition on the way from hover (0) to this one (1)."""
-        return TrimCondition(share * self.airspeed, share * self.climb_rate, self.sideslip, share * self.turn_rate)
+        """Condition on the way from hover (0) to this one (1) and on, as far as there are any."""
+        parts = {
+            name: min(LIMITS[name][0], max(-LIMITS[name][0], share * getattr(self, name)))
+            for name in ("airspeed", "climb_rate", "turn_rate")
+        }
+        return replace(self, **parts)
+
+    def toward(self, other: "TrimCondition", share: float) -> "TrimCondition":
+        """Condition on the way from this one (0) to another (1)."""
+        pairs = zip(astuple(self), astuple(other), strict=True)
+        return TrimCondition(*(start + share * (end - start) for start, end in pairs))
+
+    @property
+    def is_motion(self) -> bool:
+        """False in hover."""
+        return bool(self.airspeed or self.climb_rate or self.turn_rate)
 
     def motion(self, pitch: float, roll: float) -> tuple[Array, Array]:
         """Velocity [m/s] and angular velocity [rad/s] in body axes at an attitude [rad], each shape (3,)."""
@@ -223,6 +246,7 @@ class TrimProblem:
         self.params = aircraft.params(lead_lag, cyclic_inflow)
         self.work = P.make_work(self.params)
         self._mixing = np.stack([rotor.mixing for rotor in aircraft.rotors])
+        self._in_use = 1.0 * self._mixing.any(axis=(0, 1))  # controls that move a swashplate
         self._places, equations = self._rotor_unknowns()
         self.equations = np.concatenate([np.arange(S.VELOCITY, S.BODY_SIZE), equations])
         self.scales = self._equation_scales()
@@ -258,21 +282,17 @@ class TrimProblem:
             scales[self.layout.inflow(j)] = rotor.speed
         return scales[self.equations]
 
-    def first_guess(self, idle: float) -> Array:
-        """Hover by momentum theory: the weight on the rotors that point up, a collective right to a few degrees.
+    def lighter(self, share: float) -> "TrimProblem":
+        """The same with a share of gravity and of the fuselage's drag; the scales stay."""
+        problem = copy.copy(self)
+        air = self.params.air.copy()
+        air[[P.GRAVITY, P.PLATE_X, P.PLATE_Y, P.PLATE_Z]] *= share
+        problem.params = self.params._replace(air=air)
+        return problem
 
-        A rotor that does not point up gets the inflow of a share `idle` of that disc loading: where it has none at
-        all, its flow through the disc vanishes and so does Newton's sense of direction.
-        """
-        aircraft, air = self.aircraft, self.aircraft.environment
-        x = np.zeros(self.layout.size)
-        upward = [max(0.0, hub_axes(rotor.shaft_direction)[2, 2]) for rotor in aircraft.rotors]
-        lifting = sum(math.pi * rotor.radius**2 * up for rotor, up in zip(aircraft.rotors, upward, strict=True))
-        loading = aircraft.body.mass * air.gravity / max(lifting, 1e-6)
-        for j, (rotor, up) in enumerate(zip(aircraft.rotors, upward, strict=True)):
-            induced = math.sqrt(max(up, idle) * loading / (2 * max(air.air_density, 1e-3)))
-            x[self.layout.inflow(j).start] = induced / (rotor.speed * rotor.radius)
-        return np.concatenate([[0.0, 0.0, math.radians(9.0), 0.0, 0.0, 0.0], x[self._places]])
+    def unknowns(self, pitch: float, roll: float, controls: Array, x: Array) -> Array:
+        """Vector of unknowns of attitude and controls [rad] and of the rotors' part of a simulation state."""
+        return np.concatenate([[pitch, roll], controls, x[self._places]])
 
     def state(self, condition: TrimCondition, unknowns: Array) -> tuple[Array, Array]:
         """Simulation state at the origin, heading north, and swashplate angles of a vector of unknowns."""
@@ -313,10 +333,13 @@ class TrimProblem:
             slopes[:, angle] + slopes[:, MOTION] @ self._motion_slope(condition, unknowns, i)
             for i, angle in enumerate((S.LINEAR_THETA, S.LINEAR_PHI))
         ]
-        return np.column_stack([*columns, slopes[:, size:], slopes[:, rotor]]) / self.scales[:, None]
+        controls = slopes[:, size:] * self._in_use
+        return np.column_stack([*columns, controls, slopes[:, rotor]]) / self.scales[:, None]
 
     def _motion_slope(self, condition: TrimCondition, unknowns: Array, i: int) -> Array:
         """Derivative of u, v, w, p, q, r by pitch (i = 0) or roll (1)."""
+        if not condition.is_motion:
+            return np.zeros(len(MOTION))
         forward, backward = unknowns[:ATTITUDE_UNKNOWNS].copy(), unknowns[:ATTITUDE_UNKNOWNS].copy()
         forward[i] += BODY_STEP
         backward[i] -= BODY_STEP
@@ -327,6 +350,14 @@ class TrimProblem:
         """Name of the equation with the largest residual, as "d(state)/dt"."""
         worst = int(np.argmax(np.abs(residual)))
         return f"d({self.layout.names[self.equations[worst]]})/dt"
+
+    def balance(self, residual: Array) -> str:
+        """What the largest residual is about, in words."""
+        place = int(self.equations[int(np.argmax(np.abs(residual)))])
+        if place < S.BODY_SIZE:
+            return BODY_BALANCES[place - S.VELOCITY]
+        part = S.part_of(self.layout.names[place])
+        return f"{part.family} of {self.aircraft.rotors[part.rotor].name}"
 
     def beyond_limits(self, unknowns: Array) -> tuple[str, ...]:
         """What lies beyond its range, as "name = value deg: allowed are low to high deg"."""

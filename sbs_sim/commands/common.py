@@ -115,6 +115,17 @@ def add_flight_arguments(parser: Parser) -> None:
     )
 
 
+def add_guess_argument(parser: argparse.ArgumentParser) -> None:
+    """Where the search for a trim begins."""
+    parser.add_argument(
+        "--guess-deg",
+        nargs=4,
+        type=float,
+        metavar=("COLLECTIVE", "LATERAL", "LONGITUDINAL", "DIFFERENTIAL"),
+        help="begin with these controls [deg]: the trim to which they lead is taken (default: by momentum theory)",
+    )
+
+
 def add_worker_arguments(group: "argparse._ArgumentGroup") -> None:
     """Who does the work."""
     group.add_argument("--workers", type=int, metavar="N", help="threads (default: one for each core)")
@@ -153,6 +164,26 @@ def flight(arguments: argparse.Namespace) -> dict[str, Any]:
         "cyclic_inflow": arguments.cyclic_inflow,
         "azimuth_count": arguments.azimuth_count,
     }
+
+
+def guess(arguments: argparse.Namespace) -> list[float] | None:
+    """Controls to begin with [rad], if there are any.
+
+    Raises
+    ------
+    TrimError
+        One is out of range, in degrees as it was typed.
+    """
+    from sbs_sim import checks
+    from sbs_sim.errors import TrimError
+    from sbs_sim.model.state import CONTROL_NAMES
+
+    if arguments.guess_deg is None:
+        return None
+    pairs = zip(CONTROL_NAMES, arguments.guess_deg, strict=True)
+    return [
+        math.radians(checks.number(f"guess_deg: {name}", value, -90, 90, "deg", TrimError)) for name, value in pairs
+    ]
 
 
 def radians(name: str, degrees: float) -> float:

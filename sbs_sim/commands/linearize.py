@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import (
     add_flight_arguments,
+    add_guess_argument,
     aircraft,
     execute,
     fixed,
     flight,
+    guess,
     print_heading,
     print_limits,
     print_table,
@@ -46,6 +48,7 @@ def make_parser() -> Parser:
         description="Linearize an aircraft and print its modes.",
     )
     add_flight_arguments(parser)
+    add_guess_argument(parser)
     group = parser.add_argument_group("linear model")
     group.add_argument(
         "--method",
@@ -77,7 +80,7 @@ def _work(arguments: argparse.Namespace) -> None:
     check_target(arguments.out, ENCODERS)
     check_target(arguments.json)
     craft = aircraft(arguments)
-    full = linearize(craft, **flight(arguments), method=arguments.method)
+    full = linearize(craft, **flight(arguments), method=arguments.method, guess=guess(arguments))
     model = full.quasi_static() if arguments.quasi_static else full
     _print_model(craft, model)
     print(f"growing rotor modes: {growing_rotor_modes_text(full, craft)}")

@@ -10,11 +10,13 @@ from sbs_sim.commands.common import (
     OUTSIDE,
     UsageError,
     add_flight_arguments,
+    add_guess_argument,
     add_worker_arguments,
     aircraft,
     execute,
     fixed,
     flight,
+    guess,
     print_table,
     radians,
 )
@@ -57,6 +59,7 @@ def make_parser() -> Parser:
     parser.add_argument("range", nargs="*", type=float, metavar="START STOP COUNT", help="evenly spaced, ends included")
     parser.add_argument("--values", nargs="+", type=float, metavar="X", help="instead of a range")
     add_flight_arguments(parser)
+    add_guess_argument(parser)
     group = parser.add_argument_group("work and output")
     group.add_argument("--trims-only", dest="linear", action="store_false", help="no linear models")
     add_worker_arguments(group)
@@ -89,6 +92,7 @@ def _work(arguments: argparse.Namespace) -> None:
             parameter,
             values,
             **flight(arguments),
+            guess=guess(arguments),
             linear=arguments.linear,
             workers=arguments.workers,
             dask=arguments.dask,

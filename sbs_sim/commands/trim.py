@@ -7,10 +7,12 @@ from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import (
     DEGREES,
     add_flight_arguments,
+    add_guess_argument,
     aircraft,
     execute,
     fixed,
     flight,
+    guess,
     print_heading,
     print_limits,
     print_table,
@@ -37,6 +39,7 @@ def make_parser() -> Parser:
         description="Trim an aircraft and print the steady flight.",
     )
     add_flight_arguments(parser)
+    add_guess_argument(parser)
     parser.add_argument(
         "--method",
         choices=("newton", "two_loop"),
@@ -54,7 +57,7 @@ def _work(arguments: argparse.Namespace) -> None:
 
     check_target(arguments.json)
     craft = aircraft(arguments)
-    point = trim(craft, **flight(arguments), method=arguments.method)
+    point = trim(craft, **flight(arguments), method=arguments.method, guess=guess(arguments))
     print_trim(craft, point, linearize(craft, point=point).control_effects)
     if arguments.json:
         write(arguments.json, to_json(point.to_dict()))

@@ -141,9 +141,18 @@ def test_what_rounding_lessens_again_and_again_is_a_root():
 
     def equations(values):
         left(values)
-        return values - 0.3 + 8e-11 * 0.98**left.calls
+        return values - 0.3 + 3e-10 * (-0.9) ** left.calls
 
-    solution = newton(equations, one(0.0))
+    solution = newton(equations, one(0.0), lambda values: np.eye(1))
     assert solution.converged
-    assert solution.iterations < 10
+    assert solution.iterations == 2  # the step to the root, and one that leaves nine tenths
+    assert left.calls == 3
     assert solution.values[0] == pytest.approx(0.3, abs=1e-9)
+
+
+@pytest.mark.parametrize(("left", "converged"), [(9e-10, True), (1.1e-9, False)])
+def test_what_no_step_lessens_is_a_root_if_it_is_small(left, converged):
+    solution = newton(lambda values: np.array([left]), one(0.3), lambda values: np.eye(1))
+    assert solution.converged == converged
+    assert solution.values[0] == 0.3
+    assert solution.iterations == (0 if converged else 1)

@@ -1,6 +1,7 @@
 """Where trims are looked for: momentum theory, guesses of the user, paths; and what is told where all fail."""
 
 import math
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from sbs_sim import linearize, sweep, trim
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
-from sbs_sim.analysis.trim_search import STALLED
+from sbs_sim.analysis.trim_search import STALLED, _Search
 from sbs_sim.errors import TrimError
 from sbs_sim.model import state as S
 
@@ -75,8 +76,50 @@ def test_the_first_guess_is_a_hover_but_for_details(name):
     for j, rotor in enumerate(found.rotors):
         assert rotor.inflow == pytest.approx(names[f"lambda0({j + 1})"], rel=0.02)
         assert rotor.flap[0] == pytest.approx(names[f"a0({j + 1})"], abs=math.radians(0.1))
+        assert rotor.lag == pytest.approx(names[f"xi0({j + 1})"], rel=0.35)
         assert rotor.flap[1:] == pytest.approx([names[f"{f}1({j + 1})"] for f in "ab"], abs=math.radians(0.5))
     assert point.iterations <= 10
+
+
+@pytest.mark.parametrize("name", ["side by side", "tail rotor", "UH-60A"])
+@pytest.mark.parametrize("flight", [{}, {"turn_rate": 0.2}, {"climb_rate": -3.0, "sideslip": 0.3}])
+def test_the_first_guess_of_a_forward_flight_is_near_it(name, flight):
+    """At a twelfth of the tip speed: attitude and collectives to 2 deg, thrusts and inflow to a tenth."""
+    aircraft = AIRCRAFT[name]()
+    flight = {"airspeed": aircraft.rotors[0].speed * aircraft.rotors[0].radius / 12, **flight}
+    theory, point = MomentumTheory(TrimProblem(aircraft, True, True, 12)), trim(aircraft, **flight)
+    found = theory.balance(TrimCondition(**flight))
+    assert np.degrees([found.pitch, found.roll]) == pytest.approx(np.degrees([point.pitch, point.roll]), abs=2.0)
+    names = dict(zip(point.state_names, point.state, strict=True))
+    for j, rotor in enumerate(found.rotors):
+        assert math.degrees(rotor.collective) == pytest.approx(math.degrees(point.swashplate[j, 0]), abs=2.0)
+        if point.thrust[j] > 0.1 * point.thrust.max():
+            assert rotor.thrust == pytest.approx(point.thrust[j], rel=0.1)
+            assert rotor.inflow == pytest.approx(names[f"lambda0({j + 1})"], rel=0.1)
+
+
+def test_thrust_is_the_mean_lift_of_the_sections_over_the_azimuth(uh60a):
+    """Of a twisted blade that moves along and through its disc, by quadrature; and so is the mean lift coefficient."""
+    theory, rotor = MomentumTheory(TrimProblem(uh60a, True, True, 12)).rotors[0], uh60a.rotors[0]
+    velocity = 25.0 * np.array([1.0, 0.4, 0.0])
+    theory.meet(velocity)
+    thrust, inflow = 70000.0, 0.02
+    pitch = theory.attached(thrust, inflow)
+    _, axial = velocity @ np.array([0.99863, 0.0, 0.052336]), velocity @ np.array([0.052336, 0.0, -0.99863])
+    span, _, half_area, lifting, twist = rotor.elements(uh60a.options.elements)
+    edgewise = math.sqrt(velocity @ velocity - axial**2)
+    table = uh60a.airfoils[rotor.airfoil]
+    degree = np.argmin(np.abs(table.alpha - math.radians(6.0)))
+    slope = table.cl[-1, degree] / table.alpha[degree]  # a symmetric airfoil, at its largest Reynolds number
+    lift, pressure = 0.0, 0.0
+    for psi in 2 * math.pi * np.arange(12) / 12:
+        along = rotor.speed * (rotor.hinge_offset + span) + edgewise * math.sin(psi)
+        through = inflow * rotor.speed * rotor.radius + axial
+        area = 1.225 * rotor.blades * half_area * lifting / 12
+        lift += np.sum(area * slope * (along**2 * (pitch + twist) - along * through))
+        pressure += np.sum(area * along**2)
+    assert lift == pytest.approx(thrust, rel=1e-4)
+    assert theory.mean_lift(thrust) == pytest.approx(thrust / pressure, rel=1e-6)
 
 
 @pytest.mark.parametrize("density", [1.225, 0.4])
@@ -289,6 +332,41 @@ def test_a_flight_beyond_a_gap_is_found(sbs_paper):
     assert point.beyond_limits == ()
 
 
+WAYS = {
+    "hover": (build, {"airspeed": 8.0}, "_from_hover"),
+    "the path from hover": (build, {"airspeed": 8.0, "climb_rate": 1.0}, "_along_path"),
+    "momentum theory": (build, {"airspeed": 8.0, "turn_rate": 0.4}, "_from_momentum"),
+    "a lighter aircraft": (build, {"airspeed": 8.0, "turn_rate": 0.4}, "_from_lighter"),
+    "a slower flight": (build, {"airspeed": 20.0, "sideslip": 0.1}, "_from_other_speed"),
+    "a faster flight": (AIRCRAFT["paper"], {"airspeed": 14.0}, "_from_other_speed"),
+    "level flight, to hover": (AIRCRAFT["UH-60A"], {}, "_from_other_speed"),
+    "level flight, to a climb": (AIRCRAFT["tandem"], {"airspeed": -2.0, "climb_rate": 2.0}, "_from_other_speed"),
+}
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_every_way_by_itself_leads_to_the_flight(name):
+    make, flight, way = WAYS[name]
+    aircraft = make()
+    search = _Search(TrimProblem(aircraft, True, True, 12), TrimCondition(**flight))
+    if way == "_along_path":
+        search._from_hover()
+    found, point = getattr(search, way)(), trim(aircraft, **flight)
+    np.testing.assert_allclose(found[:6], [point.pitch, point.roll, *point.controls], atol=1e-8)
+
+
+def test_level_flight_is_looked_for_where_there_is_nothing_slower(sbs):
+    """A hover has no share of its speed: flights at 2.5 hover inflow velocities lie beside those at 0.8 and 1.3."""
+    problem = TrimProblem(sbs, True, True, 12)
+    induced = math.sqrt(sbs.body.mass * G / (2 * RHO * 2 * math.pi * sbs.rotors[0].radius ** 2))
+    (level,) = _Search(problem, TrimCondition())._other_speeds()
+    assert astuple(level) == pytest.approx((2.5 * induced, 0.0, 0.0, 0.0))
+    slower, faster = _Search(problem, TrimCondition(15.0, 1.0, 0.2, 0.3))._other_speeds()
+    assert astuple(slower) == pytest.approx((12.0, 0.8, 0.2, 0.24))
+    assert astuple(faster) == pytest.approx((19.5, 1.3, 0.2, 0.39))
+    assert len(_Search(problem, TrimCondition(-3.0))._other_speeds()) == 3
+
+
 def test_of_two_flights_the_one_within_the_limits_is_found(sbs_paper):
     """At 20 m/s in a turn there is one with 13.4 deg of longitudinal cyclic, and one with 11.9 of 12."""
     point = trim(sbs_paper, 20.0, turn_rate=0.2)
@@ -323,15 +401,16 @@ def share_of(error):
     return float(str(error).split("more than ")[1].split(" %")[0]) / 100
 
 
-def test_the_weight_that_is_told_is_what_the_rotors_carry():
-    """An aircraft of that mass hovers, one of 1 % more does not."""
+@pytest.mark.parametrize("heavy", [80.0, 400.0, 1500.0])
+def test_the_weight_that_is_told_is_what_the_rotors_carry(heavy):
+    """An aircraft of that mass hovers, one of 2 % more does not."""
     with pytest.raises(TrimError) as error:
-        trim(build(body={"mass": 400.0}))
-    assert "where R1 and R2 stall, with collective = " in str(error.value)
+        trim(build(body={"mass": heavy}))
+    assert "where R1 and R2 stall" in str(error.value)
     assert "the vertical force is not balanced" in str(error.value)
-    mass = 400.0 * share_of(error.value)
+    mass = heavy * share_of(error.value)
     assert error.value.worst_equation == "d(w)/dt"
-    assert error.value.residual == pytest.approx(1 - mass / 400.0, abs=1e-3)
+    assert error.value.residual == pytest.approx(1 - mass / heavy, abs=1e-3)
     assert trim(build(body={"mass": 0.995 * mass})).thrust.sum() == pytest.approx(0.995 * mass * G, rel=1e-3)
     with pytest.raises(TrimError):
         trim(build(body={"mass": 1.02 * mass}))
@@ -381,6 +460,20 @@ def test_beyond_the_reach_of_the_rotors_all_that_stops_them_is_told(sbs, conditi
     assert text.startswith("no trim: the path from hover ends at airspeed ")
     assert ", with collective = " in text
     assert text.endswith(f" is not balanced, residual {error.value.residual:.3g} in {error.value.worst_equation}")
+
+
+def test_what_no_weight_makes_possible_is_told_by_momentum_theory(uh60a):
+    """The drag of the main rotor's blades alone is too much for a tail rotor with blades of 2 cm.
+
+    It would need the thrust of the right one with a twelfth of its blade area: a lift coefficient above 3.
+    """
+    with pytest.raises(TrimError) as error:
+        trim(uh60a.with_value("rotors.tail.chord", {"root": 0.02, "tip": 0.02}))
+    text = str(error.value)
+    assert text.startswith("no trim: by momentum theory it takes a mean lift coefficient of ")
+    assert " of tail; the " in text
+    assert " of main" not in text.split(";")[0]
+    assert float(text.split("coefficient of ")[1].split(" ")[0]) > 3.0
 
 
 def test_every_equation_has_words(sbs):

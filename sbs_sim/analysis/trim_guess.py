@@ -292,6 +292,13 @@ class MomentumTheory:
         momentum = 2.0 * max(air.air_density, LEAST_DENSITY) * max(area, LEAST_DENSITY)
         return min(LARGEST_INFLOW, math.sqrt(self.aircraft.body.mass * air.gravity / momentum))
 
+    def lift(self, condition: TrimCondition) -> Array:
+        """Change of the controls, shape (4,), that gives lift and no moments: 1 rad on the collective it moves most."""
+        authority = self.balance(condition).authority
+        change = np.asarray(np.linalg.lstsq(authority, np.eye(4)[0], rcond=WEAKEST)[0], dtype=np.float64)
+        most = max(abs(float(rotor.mixing[0] @ change)) for rotor in self.rotors)
+        return change / most if most > 0.0 else change
+
     def stall(self, condition: TrimCondition, unknowns: Array) -> Array:
         """Pitch of each rotor's blades beyond what its thrust would need by a straight lift curve [rad], (n_rotors,).
 

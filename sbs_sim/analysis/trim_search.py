@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sbs_sim.aircraft import LEAST_DENSITY
 from sbs_sim.analysis.newton import newton
 from sbs_sim.analysis.trim_guess import MomentumTheory
-from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
+from sbs_sim.analysis.trim_problem import ATTITUDE_UNKNOWNS, BODY_UNKNOWNS, TrimCondition, TrimProblem
 from sbs_sim.errors import TrimError
 from sbs_sim.model import state as S
 
@@ -25,6 +25,7 @@ FIRST_LOAD, SMALLEST_LOAD = 0.1, 0.005  # steps of theirs
 NEARLY = 0.9  # of weight and drag: with less at the end of such a path there is no trim close by
 OTHER_SPEEDS = (0.8, 1.3)  # of the one wanted
 LEAST_POWER = 2.5  # hover inflow velocities: about the speed for the least power
+MORE_COLLECTIVE = tuple(math.radians(angle) for angle in (1.0, 2.0, 3.0, 4.0, 6.0, 8.0))
 STALLED = math.radians(5.0)  # pitch beyond what the thrust would need without stall: of a rotor on a stalled branch
 STALLS = math.radians(0.6)  # of one that carries about as much as it can
 MOST_LIFT = 1.0  # mean lift coefficient, about what rotors have at most
@@ -42,7 +43,7 @@ class _End(NamedTuple):
 
 
 def find(problem: TrimProblem, condition: TrimCondition, guess: Array | None = None) -> tuple[Array, int]:
-    """Find a trim: from a guess, from hover, along a path from hover, by momentum theory, from a lighter aircraft.
+    """Find a trim: from a guess, from hover, by momentum theory, from a lighter aircraft, from other speeds.
 
     Of several the first is taken that needs no control beyond its range and on which no rotor is stalled. What lies at
     the end of a path may need more than a control has: it is the branch of ordinary flight.
@@ -94,6 +95,7 @@ class _Search:
             (self._from_momentum, False),
             (self._from_lighter, True),
             (self._from_other_speed, True),
+            (self._beyond_ends, True),
         ):
             found = attempt()
             if found is None:
@@ -172,6 +174,18 @@ class _Search:
             found = self._walk(along, 0.0, other, FIRST_LOAD, SMALLEST_LOAD)
             if not isinstance(found, _End):
                 return found
+        return None
+
+    def _beyond_ends(self) -> Array | None:
+        """From the ends of the paths with more lift: where sections stall one after the other, it has notches."""
+        lift = self._theory.lift(self._condition)
+        for end in (self._load, self._path):
+            for angle in MORE_COLLECTIVE if end else ():
+                start = end.unknowns.copy()
+                start[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS] += angle * lift
+                found = self._newton(self._problem, self._condition, start)
+                if found is not None and not self._is_stalled(found):
+                    return found
         return None
 
     def _other_speeds(self) -> list[TrimCondition]:

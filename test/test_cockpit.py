@@ -893,11 +893,15 @@ CLICKS = {
 }
 
 
+SHOWN = {SimulationStatus.PLAYING: "Pause", SimulationStatus.PAUSED: "Play"}
+
+
 def test_space_pauses_and_goes_on_whatever_was_clicked_last(flying, page):
     made, _, _ = flying
     state = made.client.next("status").state
     for what, click in CLICKS.items():
         click(page)
+        button(page, SHOWN[state]).wait_for()
         page.wait_for_timeout(100)
         page.keyboard.press("Space")
         state = SimulationStatus.PLAYING + SimulationStatus.PAUSED - state

@@ -24,7 +24,7 @@ Answer = tuple[bool, str]  # whether it was done, and what is to be said
 
 SLIDER_STEP, KEY_STEP = 0.02, 0.1  # deg
 PLACE_STEP = 0.01  # s
-OLD_STATUS = 0.5  # s in which a status may still be one from before an answer
+OLD_STATUS, OLDEST_STATUS = 0.5, 5.0  # s in which a status may still be one from before an answer; on a busy machine
 NOTICE = 8.0  # s that a notice is shown
 PACES = ("0.01", "0.05", "0.1", "0.25", "0.5", "1", "2", "as fast as possible")
 LABELS = ("Collective", "Lateral", "Longitudinal", "Differential")
@@ -122,6 +122,7 @@ class FlyPanel:
         self._server, self._pilot, self._here = server, pilot, here
         self._paused = False
         self._answered = -math.inf  # when a pause was answered [s]
+        self._awaited = False  # until a status is as it was answered
         self._recording = False
         self._holding = False
         self._steerable = True
@@ -251,7 +252,7 @@ class FlyPanel:
             answer = self._pilot.pause(wanted)
             self._say(PAUSE if wanted else PLAY, answer)
             if answer[0]:  # the next key may come before the next status
-                self._answered = time.monotonic()
+                self._answered, self._awaited = time.monotonic(), True
                 self._show_clock(not wanted)
 
     def step(self) -> None:
@@ -391,7 +392,9 @@ class FlyPanel:
         if self._recording != recording:
             self._recording = recording
             self._record.label = END_RECORD if recording else RECORD
-        if self._paused == playing and time.monotonic() - self._answered > OLD_STATUS:
+        if self._paused != playing:
+            self._awaited = False
+        elif time.monotonic() - self._answered > (OLDEST_STATUS if self._awaited else OLD_STATUS):
             self._show_clock(playing)
         if self._holding or self._aircraft is None:
             return

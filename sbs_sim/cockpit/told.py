@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimCondition
+from sbs_sim.content import ByContent
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.simulation import Snapshot
@@ -20,8 +21,8 @@ CONTROLS = ("collective", "lateral", "longitudinal", "differential")
 FAINT, WARNING = "color:#5c6670", "color:#D55E00"
 
 
-@dataclass(frozen=True)
-class Trimmed:
+@dataclass(frozen=True, eq=False)
+class Trimmed(ByContent):
     """A trim that a service has found.
 
     Attributes

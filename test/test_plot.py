@@ -81,7 +81,7 @@ def curves(log):
 def test_a_log_of_another_recorder_is_drawn_over_simulation_time(log, tmp_path):
     """It has written down when messages came, at half the pace; their stamps tell when they were flown.
 
-    The controls are stamped with zero: theirs follows from when they came.
+    Controls and swashplates are stamped by others: theirs follows from when they came.
     """
     other = read(rewrite(tmp_path / "other.mcap", LOG, lambda now: WALL + 2 * now + 3_000_000))
     found, axis = curves(other)

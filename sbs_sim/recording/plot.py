@@ -27,7 +27,7 @@ SUFFIXES = (".png", ".svg", ".html")
 WIDTH, PANEL_HEIGHT = 8.0, 1.7  # in
 SIMULATION_TIME = "simulation time [s]"
 SAME = 1e-6  # s between stamp and log time where the log is in simulation time
-FAR = 1.0  # s from what a message must have been stamped with: some pilots stamp with the time of day, or not at all
+STAMPED = ("state", "rotors", "inflow", "status")  # topics of the simulator, whose stamps are simulation times
 STILL = 1e-6  # what an axis covers at least
 # Fixed, so that the same log gives the same bytes; text stays text.
 SETTINGS: Any = {"svg.hashsalt": "sbs_sim", "svg.fonttype": "none", "font.size": 9.0}
@@ -140,22 +140,22 @@ def _axis(log: Log) -> tuple[Callable[[Array], Array] | None, str]:
 
 def _known(log: Log) -> tuple[Array, Array] | None:
     """Log times of what the simulator published with the simulation times in their stamps [s]."""
-    for role in ("state", "rotors", "inflow", "status"):
+    for role in STAMPED:
         found = _topic(log, role)
         if found is not None and (stamps := found.stamp) is not None and stamps.any():
             return found.time, stamps
     return None
 
 
-def _time(log: Log, topic: Topic) -> Array:
-    """Time of the messages of a topic [s]; their own stamps tell it best, where they are of that time at all."""
+def _time(log: Log, role: str) -> Array:
+    """Times of a topic [s]: of the simulator's the stamps, of others when they came, however those are stamped."""
+    topic = log[role]
     convert, axis = _axis(log)
     if convert is None:
         return topic.time
-    time, stamp = convert(topic.time), topic.stamp
-    if stamp is None or axis != SIMULATION_TIME:
-        return time
-    return np.where((stamp != 0.0) & (np.abs(stamp - time) < FAR), stamp, time)
+    if role in STAMPED and axis == SIMULATION_TIME and topic.stamp is not None and topic.stamp.any():
+        return topic.stamp
+    return convert(topic.time)
 
 
 # --- what a panel shows -----------------------------------------------------------------------------------------
@@ -170,7 +170,7 @@ def _fields(log: Log, topic: str, names: Mapping[str, str], factor: float = 1.0)
     found = _topic(log, topic)
     if found is None or not len(found.time):
         return {}
-    time = _time(log, found)
+    time = _time(log, topic)
     return {shown: (time, factor * found[field]) for shown, field in names.items() if field in found}
 
 
@@ -182,7 +182,7 @@ def _attitude(log: Log) -> Curves:
     angles = np.degrees([quaternion_to_euler(quaternion) for quaternion in quaternions])
     angles[:, 0] = np.degrees(np.unwrap(np.radians(angles[:, 0])))
     names = ("yaw", "pitch", "roll")
-    time = _time(log, state)
+    time = _time(log, "state")
     return {name: (time, angles[:, i]) for i, name in enumerate(names)}
 
 

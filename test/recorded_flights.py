@@ -12,6 +12,7 @@ from nav_msgs.msg import Odometry
 from ros_harness import (
     DOMAINS,
     EXECUTABLES,
+    PATIENCE,
     controls_message,
     environment,
     world,
@@ -53,11 +54,15 @@ def fly(tmp_path, act, **parameters):
 
 
 def wiggle(made, hover, seconds=0.5):
-    """Fly with moving controls."""
+    """Fly with moving controls, that long on the clock of the wall and that of the simulation: machines are busy."""
+    if "status" not in made.client.messages:
+        made.client.watch("status", SimulationStatus)
+    flown = made.client.next("status").sim_time + seconds
     end = time.monotonic() + seconds
     for i in itertools.count():
-        if time.monotonic() > end:
+        if time.monotonic() > end and made.client.messages["status"][-1].sim_time >= flown:
             return
+        assert time.monotonic() < end + PATIENCE, "the simulation stands"
         change = DEGREE * np.sin(0.3 * i + np.arange(4))
         made.client.publish("controls", controls_message(hover.controls + change))
         made.client.spin(0.01)

@@ -13,9 +13,9 @@ _sbs_sim_options() {
         'simulator' | 'control_mixer' | 'analysis' | 'hover_hold' | 'teleop' | 'joystick') echo '--help --version --ros-args' ;;
         'replay') echo '--help --version --rate --start --end --flight --loop --topics --delay --verify --recover --set --out' ;;
         'cockpit') echo '--help --version --host --port --attach --logs' ;;
-        'trim') echo '--help --version --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --method --json' ;;
-        'linearize') echo '--help --version --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --method --quasi-static --matrices --derivatives --participation --floquet --out --json' ;;
-        'sweep') echo '--help --version --values --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --trims-only --workers --dask --out --csv --json' ;;
+        'trim') echo '--help --version --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --guess-deg --method --json' ;;
+        'linearize') echo '--help --version --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --guess-deg --method --quasi-static --matrices --derivatives --participation --floquet --out --json' ;;
+        'sweep') echo '--help --version --values --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --guess-deg --trims-only --workers --dask --out --csv --json' ;;
         'batch') echo '--help --version --flights --duration --turbulence --length --seed --spread --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --workers --dask --every --out --csv --json' ;;
         'reproduce') echo '--help --version --aircraft --paper-aircraft --json --out' ;;
         'gusts') echo '--help --version --aircraft --set --wind --turbulence --length --gust --gust-duration --seed --duration --delay --limit --json' ;;

@@ -265,7 +265,7 @@ def _states(names: tuple[str, ...]) -> _States:
 
 
 @dataclass(frozen=True, eq=False)
-class _Group:
+class _Group(ByContent):
     """States that have modes together: the longitudinal ones, the lateral ones, a family of rotors that are alike.
 
     Attributes

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft import LEAST_DENSITY, Rotor
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
+from sbs_sim.content import ByContent
 from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.airfoil import AirfoilTable
@@ -34,8 +35,8 @@ LARGEST_INFLOW = 30.0  # m/s
 LEAST_GRAVITY, LEAST_UPWARD = 1e-3, 0.03  # m/s^2; cosine of the shafts: what is divided by is never zero
 
 
-@dataclass(frozen=True)
-class Balance:
+@dataclass(frozen=True, eq=False)
+class Balance(ByContent):
     """An aircraft in balance by momentum theory.
 
     Attributes

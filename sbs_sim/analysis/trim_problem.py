@@ -22,7 +22,7 @@ from sbs_sim.model import params as P
 from sbs_sim.model import state as S
 from sbs_sim.model.average import averaged_derivative, azimuths
 from sbs_sim.model.dynamics import derivative
-from sbs_sim.model.frames import euler_to_quaternion, hub_axes, rotation_matrix
+from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
 from sbs_sim.validity import warnings

@@ -179,8 +179,8 @@ class _Search:
     def _beyond_ends(self) -> Array | None:
         """From the ends of the paths with more lift: where sections stall one after the other, it has notches."""
         lift = self._theory.lift(self._condition)
-        for end in (self._load, self._path):
-            for angle in MORE_COLLECTIVE if end else ():
+        for end in filter(None, (self._load, self._path)):
+            for angle in MORE_COLLECTIVE:
                 start = end.unknowns.copy()
                 start[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS] += angle * lift
                 found = self._newton(self._problem, self._condition, start)

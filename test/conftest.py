@@ -1,7 +1,13 @@
 """Fixtures of the physics tests: the aircraft that come with the package and their hovers."""
 
+import signal
+
 import pytest
 from hypothesis import settings
+
+# What a script starts in the background ignores Ctrl-C, and so would every process that the tests start and interrupt.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # How long one example takes says more about the machine than about the code.
 settings.register_profile("no_deadline", deadline=None)

@@ -52,7 +52,10 @@ def test_ctrl_c_ends_what_would_take_hours(call):
             assert time.monotonic() < end
             time.sleep(0.01)
         process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=PATIENCE)
+        try:
+            out, _ = process.communicate(timeout=PATIENCE)
+        finally:
+            process.kill()
     assert out == "interrupted ['MainThread']\n"
 
 

@@ -219,7 +219,8 @@ def test_a_log_with_a_time_beyond_all_bounds_is_not_flown(tmp_path, last, line):
             channel = log.add_channel(topic, kind, text, qos_profiles())
             for time, data in messages:
                 log.write(channel, time, data)
-            log.write(channel, last, messages[-1][1])
+            if topic != "/events":  # a second start would be another fault
+                log.write(channel, last, messages[-1][1])
     assert refusal(lambda: flight_of(read(path))).startswith(line)
 
 

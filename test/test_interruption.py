@@ -17,6 +17,7 @@ from sbs_sim.parallel import compute
 
 PATIENCE = 60.0  # s, generous, for machines that are busy
 CODE = """
+    import signal
     import threading
     import numpy as np
     from sbs_sim import Aircraft, Case, simulate, simulate_batch, sweep
@@ -33,6 +34,7 @@ CODE = """
         ),
         "sweep": lambda: sweep(Aircraft.load("sbs"), "airspeed", np.linspace(0.0, 20.0, 100_000), workers=2),
     }
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a script starts in the background
     print("begun", flush=True)
     try:
         calls[CALL]()

@@ -4,6 +4,8 @@ Newton's method solves all equations together; `sbs_sim.analysis.trim_search` ha
 nested loops are there to compare with.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -41,7 +41,7 @@ class PilotNode(Component):
         self.body: Array | None = None
         self.time = 0.0
         self._arrived = time.monotonic()
-        self._paused = self._stale = False
+        self._paused = self._stale = self._moves = False
         self._bad_states, self._bad_events = Refusals(self, "state"), Refusals(self, "events")
         self._output = self.create_publisher(Controls, "controls", COMMAND_QOS)
         self._health = self.create_publisher(DiagnosticArray, "diagnostics", STATE_QOS)
@@ -61,7 +61,7 @@ class PilotNode(Component):
 
     def waiting_for(self) -> str:
         """What this node waits for before it flies, in words; empty if for nothing."""
-        if self.body is None and self._paused:
+        if self._paused and not self._moves:  # who comes during a pause is told the state that stands
             return "the flight to go on: it is paused"
         if self.body is None or self._stale:
             return f"{self.topic('state')}: is a simulator running there?"
@@ -88,6 +88,7 @@ class PilotNode(Component):
             return
         if controls is not None:
             self._output.publish(controls_message(controls, message.header.stamp))
+        self._moves |= self.body is not None and now != self.time
         self.time, self.body, self._arrived = now, body, time.monotonic()
 
     def _on_event(self, message: FlightEvent) -> None:

@@ -68,7 +68,14 @@ ALLOWED = {
     "sbs_sim.errors": [],
     "sbs_sim.checks": ["sbs_sim.errors"],
     "sbs_sim.content": [],
-    "sbs_sim.model": ["sbs_sim.model", "sbs_sim.checks", "sbs_sim.content", "sbs_sim.errors"],
+    "sbs_sim.interruption": [],
+    "sbs_sim.model": [
+        "sbs_sim.model",
+        "sbs_sim.checks",
+        "sbs_sim.content",
+        "sbs_sim.errors",
+        "sbs_sim.interruption",
+    ],
     "sbs_sim.aircraft_values": ["sbs_sim.checks", "sbs_sim.errors"],
     "sbs_sim.config_file": ["sbs_sim.checks", "sbs_sim.errors"],
     "sbs_sim.aircraft": [

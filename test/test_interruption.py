@@ -61,6 +61,34 @@ def test_ctrl_c_ends_what_would_take_hours(call):
     assert out == "interrupted ['MainThread']\n"
 
 
+IN_A_CALLBACK = """
+    import signal
+    import sys
+    from sbs_sim import Aircraft, trim
+
+    def look(frame, event, _):
+        if event == "call" and frame.f_code.co_name.startswith("_raw_object_cache"):
+            sys.setprofile(None)
+            print("asked", flush=True)
+            signal.raise_signal(signal.SIGINT)
+
+    aircraft = Aircraft.load("sbs")
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    sys.setprofile(look)
+    try:
+        trim(aircraft)
+    except KeyboardInterrupt:
+        print("interrupted", signal.getsignal(signal.SIGINT) is signal.default_int_handler)
+"""
+
+
+def test_ctrl_c_is_not_lost_while_machine_code_is_loaded():
+    """Python would drop it in LLVM's calls back, and the call would go on to its end."""
+    code = [sys.executable, "-c", textwrap.dedent(IN_A_CALLBACK)]
+    ended = subprocess.run(code, capture_output=True, text=True, timeout=PATIENCE, check=True)
+    assert ended.stdout == "asked\ninterrupted True\n"
+
+
 def test_calls_at_work_end_where_they_look_and_those_that_wait_do_not_begin(sbs):
     begun, ended = [], []
 

@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from llvmlite.binding import executionengine
 from numba.types import WrapperAddressProtocol
 
+from sbs_sim.interruption import raised_outside
 from sbs_sim.model.kernel_cache import cache_folder
 
 # Everything that `fastmath` means except "there is no NaN" and "there is no infinity": the checks that
@@ -26,7 +28,7 @@ OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FASTMATH, "_nrt": 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a piece of the model; it is inlined where it is called and leaves nothing on disk."""
-    return numba.njit(forceinline=True, **OPTIONS)(function)
+    return _interruptible(numba.njit(forceinline=True, **OPTIONS)(function))
 
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -45,9 +47,20 @@ def _kept(function: Callable[..., Any], options: dict[str, Any]) -> Callable[...
     function.__code__ = function.__code__.replace(co_filename=real)
     folder = cache_folder()
     if folder is None:
-        return numba.njit(**options)(function)
+        return _interruptible(numba.njit(**options)(function))
     with _cache_in(folder):
-        return numba.njit(cache=True, **options)(function)
+        return _interruptible(numba.njit(cache=True, **options)(function))
+
+
+def _interruptible(dispatcher: Any) -> Any:
+    """Let no Ctrl-C be lost while the machine code of a function is compiled or loaded.
+
+    LLVM calls back into Python meanwhile, and an exception that is raised in such a callback has nobody to go to.
+    """
+    if not numba.config.DISABLE_JIT:
+        for name in ("_compile_for_args", "compile"):
+            setattr(dispatcher, name, raised_outside(executionengine.__file__, getattr(dispatcher, name)))
+    return dispatcher
 
 
 class Address(WrapperAddressProtocol):

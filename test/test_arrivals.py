@@ -48,19 +48,20 @@ def told(client, text):
 
 
 def test_a_command_from_before_the_one_in_force_is_refused(flight, hover):
+    """Both come at once; where a busy machine holds the second back for long, its clock counts as put back: again."""
     client = flight.client
-    before = int(rejections(client)["rejected_messages"])
-    last = now(client)
-    first = stamped(hover, last)
-    first.collective += 1e-4  # its own, as swashplates of before may still wait to be taken
-    client.publish("controls", first)
-    client.next("swashplate", lambda m: m.rotors[0].collective == pytest.approx(first.collective, rel=1e-9))
-    client.publish("controls", stamped(hover, last - 10_000_000))
-    after = client.until(
-        lambda: (found := rejections(client)) and int(found["rejected_messages"]) > before and found, "it"
-    )
-    assert int(after["rejected_messages"]) == before + 1
-    assert after["last_rejection"].endswith("0.01 s before that of the command in force")
+    before = after = int(rejections(client)["rejected_messages"])
+    tries = 0
+    while after == before and tries < 10:
+        tries += 1
+        last = now(client)
+        for stamp in (last, last - 10_000_000):
+            client.publish("controls", stamped(hover, stamp))
+        client.next("diagnostics", mixer_status)  # which may be of before
+        found = rejections(client)
+        after = int(found["rejected_messages"])
+    assert after == before + 1, tries
+    assert found["last_rejection"].endswith("0.01 s before that of the command in force")
 
 
 def test_the_same_stamp_again_and_no_stamp_are_new_commands(flight, hover):

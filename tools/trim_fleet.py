@@ -109,11 +109,14 @@ def _after_success(other: "Other", aircraft: Aircraft, point: TrimPoint, probe: 
 
 
 def _fault(aircraft: Aircraft, point: TrimPoint, residual: np.ndarray, word: str) -> str:
-    """Why a trim is none; empty if it is one. Stalled flights are not flown: they may last no revolution."""
+    """Why a trim is none; empty if it is one.
+
+    Flown are those that can be: stalled ones may last no revolution, controls beyond their ranges are refused.
+    """
     left = float(np.abs(residual).max())
     if not left < SOLVED:
         return f"residual {left:.2g}"
-    if word == STALL:
+    if word == STALL or point.beyond_limits:
         return ""
     duration = math.ceil(100 * 2 * math.pi / min(rotor.speed for rotor in aircraft.rotors)) / 100  # in whole ticks
     flown = simulate(aircraft, point, point.controls, duration)

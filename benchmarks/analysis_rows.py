@@ -14,9 +14,9 @@ from sbs_sim.analysis.sweep import sweep
 from sbs_sim.analysis.trim import TrimPoint
 from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
-from sbs_sim.model import params as P
+from sbs_sim.engine import Engine
 from sbs_sim.model import state as S
-from sbs_sim.model.average import averaged_derivative
+from sbs_sim.model.average import azimuths
 
 Row = tuple[str, float, str, str]
 Timed = Callable[[Callable[[], Any], int], tuple[float, str]]
@@ -77,20 +77,19 @@ def _options(aircraft: Aircraft) -> dict[str, Any]:
 
 def _rates(aircraft: Aircraft, point: TrimPoint) -> Callable[[Any], Any]:
     """Averaged rates of the linear state as a function of states and controls, for a generic differentiator."""
-    params = aircraft.params()
-    work, layout = P.make_work(params), aircraft.layout
-    dx, loads = np.zeros(layout.size), np.zeros((len(aircraft.rotors), P.LOAD_SIZE))
+    engine, layout = Engine(aircraft.arranged(True, True, "points")), aircraft.layout
+    psi = azimuths(layout.blades, point.azimuth_count)
 
     def rates(inputs: Any) -> Any:
         x = layout.from_linear(inputs[: layout.linear_size])
         swash = aircraft.mix(inputs[layout.linear_size :])
-        averaged_derivative(params, x, swash, point.azimuth_count, np.zeros(3), work, dx, loads)
+        dx, _ = engine.average(x, swash, psi)
         u, v, w, p, q, r = dx[S.VELOCITY : S.BODY_SIZE]
         theta, phi = inputs[S.LINEAR_THETA], inputs[S.LINEAR_PHI]
         pitch_rate = inputs[S.LINEAR_Q] * np.cos(phi) - inputs[S.LINEAR_R] * np.sin(phi)
         yaw_part = inputs[S.LINEAR_Q] * np.sin(phi) + inputs[S.LINEAR_R] * np.cos(phi)
         roll_rate = inputs[S.LINEAR_P] + np.tan(theta) * yaw_part
-        return np.concatenate([[u, w, q, pitch_rate, v, p, roll_rate, r], dx[S.BODY_SIZE :]])
+        return np.concatenate([[u, w, q, pitch_rate, v, p, roll_rate, r], dx[S.BODY_SIZE : layout.size]])
 
     return rates
 

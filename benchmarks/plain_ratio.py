@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from sbs_sim import Aircraft, trim
-from sbs_sim.model import params as P
-from sbs_sim.model.average import averaged_derivative
+from sbs_sim.engine import Engine
+from sbs_sim.model.average import averaged_derivative, azimuths
+from sbs_sim.model.records import LOAD_SIZE
 from sbs_sim.simulation import trimmed_state
 
 TEST_FOLDER = Path(__file__).resolve().parent.parent / "test"
@@ -63,9 +64,15 @@ def plain_rows(aircraft: Aircraft, point: Any, name: str) -> list[Row]:
 
 def package_calls(aircraft: Aircraft, x: Any, swash: Any) -> tuple[Call, Any]:
     """The package's derivative, called a number of times by compiled code, and the array of the mean rates."""
-    p = aircraft.params()
-    work, rates, loads = P.make_work(p), np.zeros_like(x), np.zeros((len(aircraft.rotors), P.LOAD_SIZE))
-    return lambda calls: averaged_derivative(p, x, swash, calls, np.zeros(3), work, rates, loads), rates
+    engine = Engine(aircraft.arranged(True, True, "blades"))
+    code, angles, still_air = engine.code.derivative, np.ravel(swash), np.zeros(3)
+    rates, loads = np.zeros(len(x) + 3), np.zeros(len(aircraft.rotors) * LOAD_SIZE)
+
+    def call(calls: int) -> None:
+        psi = azimuths(aircraft.layout.blades, calls)
+        averaged_derivative(code, engine.model, x, angles, psi, still_air, engine.work, engine.tick, rates, loads)
+
+    return call, rates[: len(x)]
 
 
 def plain_calls(aircraft: Aircraft, x: Any, swash: Any) -> tuple[Call, Any]:

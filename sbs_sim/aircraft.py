@@ -4,6 +4,8 @@ The keys of a file, their types and plain ranges are in config/aircraft.schema.j
 concerns several values at once is checked here.
 """
 
+from __future__ import annotations  # `help` then shows types by their names
+
 import hashlib
 import itertools
 import json
@@ -15,23 +17,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks, config_file
+from sbs_sim.aircraft_model import model_of, with_fidelity
 from sbs_sim.aircraft_values import Place, check_path, mirrored, places, replaced, separate, value_at
 from sbs_sim.content import ByContent
 from sbs_sim.errors import AircraftError, AirfoilError
-from sbs_sim.model import params as P
-from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells, read_table, stall_angles
-from sbs_sim.model.frames import hub_axes
+from sbs_sim.model.airfoil import AirfoilTable, read_table, stall_angles
+from sbs_sim.model.frames import ONE, hub_axes
+from sbs_sim.model.mixing import mixed
+from sbs_sim.model.packing import by_blades, lane_count, side_by_side
+from sbs_sim.model.records import Model
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES, StateLayout
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
+EARLIER = ("interpolation", "linear")  # what there was before there was a choice, and the same hash
 # Of a rotor and of the air, for the model.
 NOT_PHYSICS = ("name", "airfoil", "collective_range", "cyclic_range", "swashplate_rate", "speed_of_sound")
 MOST_TOLD = 5  # changes that a refusal names
-LEAST_DENSITY = 1e-12  # kg/m^3, less than at 300 km: a vacuum
 
 
 @dataclass(frozen=True)
@@ -68,12 +73,13 @@ class Body(ByContent):
 
 @dataclass(frozen=True)
 class Options:
-    """How the model reads the equations: see theory.md sections 5 and 9."""
+    """How the model reads the equations: see theory.md sections 4, 5 and 9."""
 
     coupling: str
     hub_moment: str
     flap_inertia: str
     elements: int
+    interpolation: str = "linear"  # of files from before there was a choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +197,7 @@ class Aircraft(ByContent):
     folder: Path = field(repr=False, compare=False)
 
     @classmethod
-    def load(cls, path_or_name: str | Path) -> "Aircraft":
+    def load(cls, path_or_name: str | Path) -> Aircraft:
         """Read an aircraft file.
 
         Parameters
@@ -212,7 +218,7 @@ class Aircraft(ByContent):
             raise AircraftError(f"{path}: {error}") from None
 
     @classmethod
-    def from_dict(cls, data: Any, folder: Path | None = None) -> "Aircraft":
+    def from_dict(cls, data: Any, folder: Path | None = None) -> Aircraft:
         """Aircraft of a mapping with the keys of an aircraft file.
 
         Parameters
@@ -230,7 +236,7 @@ class Aircraft(ByContent):
         return cls._made_of(data, Path.cwd() if folder is None else checks.path("folder", folder, AircraftError))
 
     @classmethod
-    def _made_of(cls, data: Any, folder: Path, similar: "Aircraft | None" = None) -> "Aircraft":
+    def _made_of(cls, data: Any, folder: Path, similar: Aircraft | None = None) -> Aircraft:
         """Checked aircraft of a mapping, with the airfoil tables of a similar one where they are the same."""
         _check_schema(data)
         data = separate(data)
@@ -264,7 +270,7 @@ class Aircraft(ByContent):
         found = [value_at(self.data, place) for place in places(self.data, _schema(), path)]
         return found[0] if len(found) == 1 else found
 
-    def with_value(self, path: str, value: Any) -> "Aircraft":
+    def with_value(self, path: str, value: Any) -> Aircraft:
         """Aircraft with one value of its file changed.
 
         Parameters
@@ -284,7 +290,7 @@ class Aircraft(ByContent):
         check_path(path)
         return self.with_values({path: value})
 
-    def with_values(self, values: Mapping[str, Any]) -> "Aircraft":
+    def with_values(self, values: Mapping[str, Any]) -> Aircraft:
         """Aircraft with several values of its file changed, which are checked together and not one after the other.
 
         Parameters
@@ -336,7 +342,7 @@ class Aircraft(ByContent):
         digest = hashlib.sha256()
         for part in (self.environment, self.body, self.options, *self.rotors):
             for name, value in vars(part).items():
-                if name not in NOT_PHYSICS:
+                if name not in NOT_PHYSICS and (name, value) != EARLIER:
                     _digest(digest, name, value)
         for table in self.tables:
             for name in ("reynolds", "alpha", "cl", "cd"):
@@ -359,9 +365,15 @@ class Aircraft(ByContent):
             entry["airfoil"] = names[entry["airfoil"]]
         return data, contents
 
-    def mix(self, controls: Array) -> Array:
+    def mix(self, controls: ArrayLike) -> Array:
         """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls [rad], shape (4,)."""
-        return np.stack([rotor.mixing @ np.asarray(controls, dtype=float) for rotor in self.rotors])
+        angles = np.empty((3 * len(self.rotors), 1))
+        mixed(self._mixing, np.asarray(controls, dtype=float).reshape(-1, 1), ONE, angles)
+        return angles.reshape(-1, 3)
+
+    @cached_property
+    def _mixing(self) -> Array:
+        return np.concatenate([rotor.mixing for rotor in self.rotors])
 
     def unmix(self, angles: Array) -> Array:
         """Pilot controls [rad], shape (4,), whose mixture is nearest to swashplate angles [rad], (n_rotors, 3)."""
@@ -385,8 +397,8 @@ class Aircraft(ByContent):
             inertia -= _blades_inertia(rotor)
         return mass, first, inertia
 
-    def params(self, lead_lag: bool = True, cyclic_inflow: bool = True) -> P.Params:
-        """Arrays of the compiled model with the given fidelity (theory.md section 7).
+    def model(self, lead_lag: bool = True, cyclic_inflow: bool = True) -> Model:
+        """Records of the compiled model with the given fidelity (theory.md section 7), with a single lane everywhere.
 
         Parameters
         ----------
@@ -397,11 +409,27 @@ class Aircraft(ByContent):
 
         Returns
         -------
-        Params
-            Shared with other callers: read only.
+        Model
+            Shared with other callers: read only. `sbs_sim.model.packing` arranges it for the processor.
         """
-        choices = [lead_lag, cyclic_inflow, self.options.coupling == "complete", self.options.hub_moment == "complete"]
-        return self._params._replace(switches=np.array(choices, dtype=np.int64))
+        return with_fidelity(self._model, lead_lag, cyclic_inflow)
+
+    def arranged(self, lead_lag: bool, cyclic_inflow: bool, lanes: str) -> Model:
+        """`model` with its blades in the lanes (lanes = "blades"), or copies of it ("points"); read only."""
+        key = lead_lag, cyclic_inflow, lanes
+        if key not in self._arrangements:
+            model, count = self.model(lead_lag, cyclic_inflow), lane_count()
+            made = by_blades(model, count) if lanes == "blades" else side_by_side([model] * count)
+            self._arrangements[key] = made
+        return self._arrangements[key]
+
+    @cached_property
+    def _arrangements(self) -> dict[tuple[bool, bool, str], Model]:
+        return {}
+
+    @cached_property
+    def _model(self) -> Model:
+        return model_of(self)
 
     @cached_property
     def stall_table(self) -> Array:
@@ -413,60 +441,6 @@ class Aircraft(ByContent):
                 for table in self.tables
             ]
         )
-
-    @cached_property
-    def _params(self) -> P.Params:
-        """Arrays but for the switches; nobody writes to them."""
-        complete = self.options.coupling == "complete"
-        mass, first, inertia = self.fuselage() if complete else (self.body.mass, np.zeros(3), self.body.inertia)
-        different = list(dict.fromkeys(self.tables))
-        tables = [cells(table) for table in different]
-        first_rows = np.concatenate([[0], np.cumsum([len(table) for table in tables])])
-        index, grid = _airfoil_grids(self, dict(zip(different, first_rows, strict=False)))
-        air = self.environment
-        return P.Params(
-            air=np.array([air.air_density, 1 / air.kinematic_viscosity, air.gravity, *self.body.flat_plate_areas]),
-            body=np.array([mass, *first, *inertia.ravel()]),
-            switches=np.zeros(P.SWITCH_COUNT, dtype=np.int64),
-            first_blade=np.cumsum([0, *(rotor.blades for rotor in self.rotors)]).astype(np.int64),
-            first_block=np.cumsum([0, *(-(-rotor.blades // P.LANES) for rotor in self.rotors)]).astype(np.int64),
-            rotor=np.stack([self._rotor_row(rotor) for rotor in self.rotors]),
-            axes=np.stack([hub_axes(rotor.shaft_direction) for rotor in self.rotors]),
-            element=np.stack([_chunks(rotor.elements(self.options.elements)) for rotor in self.rotors]),
-            cells=np.concatenate(tables),
-            grid_index=index,
-            grid=grid,
-        )
-
-    def _rotor_row(self, rotor: Rotor) -> Array:
-        row = np.zeros(P.ROTOR_SIZE)
-        row[P.SPEED], row[P.RADIUS], row[P.SENSE] = rotor.speed, rotor.radius, rotor.rotation
-        row[P.HINGE], row[P.FLAP_HINGE] = rotor.hinge_offset, rotor.flap_hinge_offset
-        row[P.LAG_HINGE] = rotor.hinge_offset - rotor.flap_hinge_offset
-        row[P.BLADE_MASS], row[P.S1], row[P.A1_HUB] = (
-            rotor.blade_mass,
-            rotor.first_moment,
-            rotor.second_moment,
-        )
-        whole = self.options.flap_inertia == "axis_to_tip"
-        row[P.A1] = rotor.blade_mass * rotor.radius**2 / 3 if whole else rotor.second_moment
-        row[P.FLAP_SPRING], row[P.LAG_SPRING] = rotor.flap_spring, rotor.lag_spring
-        row[P.LAG_DAMPING] = rotor.lag_damping
-        row[P.PITCH_FLAP], row[P.PITCH_LAG] = rotor.pitch_flap_coupling, rotor.pitch_lag_coupling
-        row[P.COS_PHASE], row[P.SIN_PHASE] = (
-            math.cos(rotor.swashplate_phase),
-            math.sin(rotor.swashplate_phase),
-        )
-        row[P.DUCT] = rotor.duct_expansion
-        row[P.HUB_X : P.HUB_Z + 1] = rotor.hub
-        spacing = 2 * math.pi / rotor.blades
-        row[P.COS_SPACING], row[P.SIN_SPACING] = math.cos(spacing), math.sin(spacing)
-        row[P.INVERSE_BLADES], row[P.INVERSE_TIP_SPEED] = 1 / rotor.blades, 1 / (rotor.speed * rotor.radius)
-        density, tip_speed = self.environment.air_density, rotor.speed * rotor.radius
-        # in vacuum the coefficients are zero, not zero over zero
-        pressure = density * math.pi * rotor.radius**2 * tip_speed**2
-        row[P.LOAD_SCALE] = 1 / pressure if density > LEAST_DENSITY else 0.0
-        return row
 
 
 def _python(value: Any) -> Any:
@@ -643,42 +617,15 @@ def _digest(digest: Any, name: str, value: Any) -> None:
     digest.update(f"{name}{values.shape}".encode() + values.tobytes())
 
 
-def _airfoil_grids(aircraft: Aircraft, first_rows: dict[AirfoilTable, int]) -> tuple[P.IntArray, Array]:
-    """`grid_index` and `grid` of Params, with the first row of each table in `cells`."""
-    most = max(len(table.reynolds) - 1 for table in aircraft.tables)
-    most += -most % P.KNOT_GROUP
-    elements = aircraft.options.elements + -aircraft.options.elements % P.REGISTER
-    index = np.zeros((len(aircraft.rotors), 4), dtype=np.int64)
-    grid = np.zeros((len(aircraft.rotors), 2 + 2 * most))
-    for j, table in enumerate(aircraft.tables):
-        count = len(table.reynolds) - 1
-        n_alpha, alpha0, inverse_step = cell_grid(table)
-        index[j] = first_rows[table], n_alpha, count, elements
-        grid[j, :2] = alpha0, inverse_step
-        widths = np.diff(table.reynolds)
-        grid[j, 2 : 2 + count] = 1 / widths
-        grid[j, 2 + most : 2 + most + count] = table.reynolds[:-1] / widths
-    return index, grid
-
-
-def _chunks(elements: Array) -> Array:
-    """Elements of a blade in chunks, shape (n_chunks, ELEMENT_SIZE), filled up with copies of the last without area."""
-    rows, count = elements.shape
-    missing = -count % P.CHUNK
-    fill = np.repeat(elements[:, -1:], missing, axis=1)
-    fill[P.HALF_AREA // P.CHUNK] = 0.0
-    chunks = np.concatenate([elements, fill], axis=1).reshape(rows, -1, P.CHUNK)
-    return np.ascontiguousarray(chunks.swapaxes(0, 1).reshape(-1, P.ELEMENT_SIZE))
-
-
 def _blades_inertia(rotor: Rotor) -> Array:
     """Inertia about the c.g. of a rotor's undeflected blades, averaged over azimuth [kg m^2], shape (3, 3)."""
     e0 = rotor.hinge_offset
     polar = rotor.blades * (rotor.blade_mass * e0**2 + 2 * e0 * rotor.first_moment + rotor.second_moment)
     axes = hub_axes(rotor.shaft_direction)
-    about_hub = axes @ np.diag([polar / 2, polar / 2, polar]) @ axes.T
+    about_hub = polar / 2 * (np.eye(3) + np.outer(axes[:, 2], axes[:, 2]))
     hub, mass = rotor.hub, rotor.blades * rotor.blade_mass
-    return about_hub + mass * (hub @ hub * np.eye(3) - np.outer(hub, hub))
+    distance = hub[0] * hub[0] + hub[1] * hub[1] + hub[2] * hub[2]
+    return np.asarray(about_hub + mass * (distance * np.eye(3) - np.outer(hub, hub)))
 
 
 def _physical_problems(aircraft: Aircraft) -> list[str]:

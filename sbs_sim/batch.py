@@ -8,7 +8,8 @@ from __future__ import annotations  # `help` then shows types by their names
 import inspect
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -23,14 +24,16 @@ from sbs_sim.content import ByContent
 from sbs_sim.errors import BatchError, SbsError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_angles
+from sbs_sim.model.packing import lane_count
 from sbs_sim.model.wind import Wind
 from sbs_sim.parallel import checked_workers, compute
-from sbs_sim.simulation import Commands, fly_commands
+from sbs_sim.simulation import Commands, Sortie, fly_together, structure
 
 if TYPE_CHECKING:
     import distributed
 
 Array = NDArray[np.float64]
+Result = tuple[dict[str, Array], str | None, tuple[str, ...]]  # histories, error, warnings of a flight
 
 LOADED = ("acceleration", "thrust", "torque", "power")  # which take a derivative at every row
 GROUPS = ("state", "controls", "swashplate", *LOADED)
@@ -207,14 +210,20 @@ def simulate_batch(
     told: list[tuple[str, ...]] = [()] * len(cases)
     done = itertools.count(1)
 
-    def keep(i: int, result: tuple[dict[str, Array], str | None, tuple[str, ...]]) -> None:
+    def keep(i: int, result: Result) -> None:
         flown, errors[i], told[i] = result
         _fill(histories, i, flown, cases[i].aircraft.layout.names, names)
         if progress is not None:
             progress(i, next(done), len(cases))
 
-    calls = [(case.aircraft, case.start, case.controls, case.wind, dict(case.changes), plan) for case in cases]
-    compute(_fly, calls, keep, workers=count, cancelled=cancelled, dask=dask)
+    groups = _groups(cases, count or 1)
+    calls = [(cases[group[0]].aircraft, [_flight(cases[i]) for i in group], plan) for group in groups]
+
+    def keep_all(number: int, results: list[Result]) -> None:
+        for i, result in zip(groups[number], results, strict=True):
+            keep(i, result)
+
+    compute(_fly, calls, keep_all, workers=count, cancelled=cancelled, dask=dask)
     time = np.multiply(np.arange(rows) * plan.every, plan.options["tick"], dtype=float)
     return Batch(tuple(cases), time, names, histories, tuple(errors), tuple(told))
 
@@ -283,35 +292,88 @@ def _fill(
             target[(slice(None), *map(slice, values.shape[1:]))] = values
 
 
-def _fly(
+def _groups(cases: Sequence[Case], workers: int) -> list[list[int]]:
+    """Numbers of the cases that a worker takes at a time, of one aircraft: as many as lanes if all get some."""
+    size = max(1, min(lane_count(), -(-len(cases) // workers)))
+    groups: list[list[int]] = []
+    for _, alike in itertools.groupby(range(len(cases)), key=lambda i: id(cases[i].aircraft)):
+        numbers = list(alike)
+        groups += [numbers[k : k + size] for k in range(0, len(numbers), size)]
+    return groups
+
+
+def _flight(case: Case) -> tuple[Any, ...]:
+    """What a worker needs to know of a case beside its aircraft."""
+    return case.start, case.controls, case.wind, dict(case.changes)
+
+
+def _fly(aircraft: Aircraft, flights: Sequence[tuple[Any, ...]], plan: Plan) -> list[Result]:
+    """What is asked for of some flights, their errors, and their warnings."""
+    results: list[Result] = [({}, None, ())] * len(flights)
+    sorties: dict[int, Sortie] = {}
+    for i, flight in enumerate(flights):
+        try:
+            start, controls, wind, changes = flight
+            sorties[i] = _sortie(aircraft, start, controls, wind, changes, plan)
+        except SbsError as error:
+            results[i] = {}, str(error), ()
+    for numbers in _side_by_side(sorties):
+        fly_together([sorties[i] for i in numbers])
+        for i in numbers:
+            results[i] = _result(sorties[i], plan)
+    return results
+
+
+def _side_by_side(sorties: Mapping[int, Sortie]) -> Iterator[list[int]]:
+    """Flights of one structure together; few of them are faster one after the other."""
+    alike: dict[Any, list[int]] = defaultdict(list)
+    for i, sortie in sorties.items():
+        alike[structure(sortie.simulation)].append(i)
+    for numbers in alike.values():
+        if 2 * len(numbers) > lane_count():
+            yield numbers
+        else:
+            yield from ([i] for i in numbers)
+
+
+def _sortie(
     aircraft: Aircraft,
     start: TrimPoint | ArrayLike | Mapping[str, float],
     controls: Commands | None,
     wind: Wind,
     changes: dict[str, Any],
     plan: Plan,
-) -> tuple[dict[str, Array], str | None, tuple[str, ...]]:
-    """What is asked for of one flight, its error, and its warnings."""
+) -> Sortie:
+    """A flight that is ready to begin.
+
+    Raises
+    ------
+    SbsError
+        It cannot begin.
+    """
+    layout = aircraft.layout
+    if changes:
+        aircraft = aircraft.with_values(changes)
+    if aircraft.layout != layout:
+        raise BatchError(f"changes = {changes}: allowed are those that leave the states as they are")
+    if isinstance(start, Mapping):
+        if unknown := [name for name in start if name not in TRIM_ARGUMENTS]:
+            name = checks.shown(unknown[0])
+            raise BatchError(f"start: {name}: unknown, allowed are {', '.join(TRIM_ARGUMENTS)}")
+        fidelity = {name: plan.options[name] for name in FIDELITY if name in plan.options}
+        start = trim(aircraft, **{**fidelity, **start})
+    if controls is None:
+        if not isinstance(start, TrimPoint):
+            raise BatchError("controls: needed where the start is a state")
+        controls = start.controls
+    loaded = any(name in LOADED for name in plan.outputs)
+    return Sortie(aircraft, start, controls, plan.duration, every=plan.every, loaded=loaded, wind=wind, **plan.options)
+
+
+def _result(sortie: Sortie, plan: Plan) -> Result:
+    """What is asked for of a flight that has ended, its error, and its warnings."""
     try:
-        layout = aircraft.layout
-        if changes:
-            aircraft = aircraft.with_values(changes)
-        if aircraft.layout != layout:
-            raise BatchError(f"changes = {changes}: allowed are those that leave the states as they are")
-        if isinstance(start, Mapping):
-            if unknown := [name for name in start if name not in TRIM_ARGUMENTS]:
-                name = checks.shown(unknown[0])
-                raise BatchError(f"start: {name}: unknown, allowed are {', '.join(TRIM_ARGUMENTS)}")
-            fidelity = {name: plan.options[name] for name in FIDELITY if name in plan.options}
-            start = trim(aircraft, **{**fidelity, **start})
-        if controls is None:
-            if not isinstance(start, TrimPoint):
-                raise BatchError("controls: needed where the start is a state")
-            controls = start.controls
-        loaded = any(name in LOADED for name in plan.outputs)
-        flown, fault = fly_commands(
-            aircraft, start, controls, plan.duration, every=plan.every, loaded=loaded, wind=wind, **plan.options
-        )
+        flown, fault = sortie.result()
     except SbsError as error:
         return {}, str(error), ()
     kept = {name: flown[name] for name in plan.outputs if name in flown}

@@ -10,7 +10,8 @@ from __future__ import annotations  # `help` then shows types by their names
 import collections
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,19 +20,19 @@ from numpy.typing import ArrayLike, NDArray
 from sbs_sim import checks, interruption
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimPoint
-from sbs_sim.content import ByContent
+from sbs_sim.engine import Engine
 from sbs_sim.errors import SimulationError
+from sbs_sim.flight_records import Event, Rows, Snapshot
+from sbs_sim.formation import Flown, Formation
 from sbs_sim.mixer import ROUNDING, Mixer, check_controls, check_ranges
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.dynamics import derivative
-from sbs_sim.model.fly import fly
-from sbs_sim.model.frames import euler_angles, euler_to_quaternion, rotation_matrix, to_body
+from sbs_sim.model.frames import down_of, euler_angles, euler_to_quaternion, rotation_matrix, to_body
 from sbs_sim.model.ground import lowest_point
-from sbs_sim.model.integrate import PARTITIONED, RK4, TSIT5, advance
-from sbs_sim.model.kernel import address
+from sbs_sim.model.integrate import FLYING, PARTITIONED, RK4, TSIT5, advance
 from sbs_sim.model.multiblade import blade_matrix
-from sbs_sim.model.wind import Wind, WindField, wind_at
+from sbs_sim.model.wind import Wind, WindField, winds_at
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
 from sbs_sim.validity import flight_warnings
 
@@ -59,97 +60,6 @@ PLAUSIBLE_VELOCITY = 350.0  # m/s
 PLAUSIBLE_RATE = 100.0  # rad/s
 PLAUSIBLE_ANGLE = 1.5  # rad, multiblade coordinates of flap and lag
 PLAUSIBLE_INFLOW = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Snapshot(ByContent):
-    """Everything that can be told of one instant.
-
-    Attributes
-    ----------
-    step : int
-        Number of the integration step.
-    time : float
-        Simulation time [s].
-    state : ndarray, shape (size,)
-        Simulation state, see `sbs_sim.model.state`.
-    acceleration : ndarray, shape (3,)
-        Inertial acceleration of the c.g. in body axes [m/s^2].
-    swashplate : ndarray, shape (n_rotors, 3)
-        Angles in force [rad].
-    azimuth : ndarray, shape (n_rotors,)
-        [rad], 0 to 2 pi.
-    loads : ndarray, shape (n_rotors, LOAD_SIZE)
-        Thrust, torque, hub force and moment, see `sbs_sim.model.params`.
-    wind : ndarray, shape (3,)
-        Velocity of the air, NED [m/s].
-    working : ndarray, shape (n_rotors, WORKING_SIZE), or None
-        Working states of the rotors, see `sbs_sim.model.working_state`; None where nobody knows them.
-    """
-
-    step: int
-    time: float
-    state: Array
-    acceleration: Array
-    swashplate: Array
-    azimuth: Array
-    loads: Array
-    wind: Array
-    working: Array | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Rows(ByContent):
-    """Instants of a flight one below the other: what `Snapshot` tells, with one more axis in front of each.
-
-    Attributes
-    ----------
-    step, time, state, acceleration, swashplate, azimuth, loads, wind : ndarray
-        See `Snapshot`; acceleration and loads are zero where they were not asked for.
-    """
-
-    step: NDArray[np.int64]
-    time: Array
-    state: Array
-    acceleration: Array
-    swashplate: Array
-    azimuth: Array
-    loads: Array
-    wind: Array
-
-    def first(self, count: int) -> Rows:
-        """The first instants."""
-        return Rows(*(getattr(self, part.name)[:count] for part in fields(self)))
-
-
-@dataclass(frozen=True, eq=False)
-class Event(ByContent):
-    """Something that acts on a flight between two ticks: all events together repeat it bit for bit, see `refly`.
-
-    Attributes
-    ----------
-    step : int
-        Integration steps before it.
-    kind : str
-        "start" (state, swashplate, wind), "swashplate", "reset" (state, swashplate) or "wind".
-    swashplate : ndarray, shape (n_rotors, 3), or None
-        [rad]
-    state : ndarray, shape (size,), or None
-    wind : Wind or None
-    wind_step : int
-        Of a start: integration steps before its wind was set, which is earlier than the start where a log begins in
-        mid-flight.
-    wind_ticks : int
-        Of a start: ticks of its wind that have begun; 0 for one that is new.
-    """
-
-    step: int
-    kind: str
-    swashplate: Array | None = None
-    state: Array | None = None
-    wind: Wind | None = None
-    wind_step: int = 0
-    wind_ticks: int = 0
 
 
 class Simulation:
@@ -223,19 +133,23 @@ class Simulation:
                 f" {tick:g} s: allowed are up to {MOST_STEPS_PER_TICK}"
             )
         self.step_size = tick / self.steps_per_tick
-        self._method = METHODS[method]
+        self.method = METHODS[method]
+        self.model = aircraft.model(lead_lag, cyclic_inflow)
+        self.bounds = np.append(plausible_bounds(aircraft), -ground)
+        self.watch = max(1, round(WATCH_PERIOD / tick))
+        self.azimuth0 = np.zeros(len(aircraft.rotors))
         self._held = held_states(aircraft, lead_lag, cyclic_inflow)
-        self._params = aircraft.params(lead_lag, cyclic_inflow)
-        self._work = P.make_work(self._params)
-        self._bounds = np.append(plausible_bounds(aircraft), -ground)
-        self._stall = aircraft.stall_table
-        self._watch = max(1, round(WATCH_PERIOD / tick))
-        self._azimuth0 = np.zeros(len(aircraft.rotors))
-        self._slope = np.zeros(self.layout.size)
+        self._speeds = np.array([rotor.speed for rotor in aircraft.rotors])
         self.step = 0
         self.set_wind(Wind() if wind is None else wind)
         self.state = self.checked_state(state)
         self.swashplate = self.checked_swashplate(swashplate)
+
+    @cached_property
+    def engine(self) -> Engine:
+        """What flies this aircraft alone."""
+        options = self.options["lead_lag"], self.options["cyclic_inflow"]
+        return Engine(self.aircraft.arranged(*options, "blades"), self.method)
 
     @property
     def time(self) -> float:
@@ -294,17 +208,19 @@ class Simulation:
         values = checks.array("state", state, SimulationError).ravel()
         if len(values) != self.layout.size:
             raise SimulationError(f"state has {len(values)} values: allowed are {self.layout.size}")
-        for name, value, bound in zip(self.layout.names, values, self._bounds[:-1], strict=True):
+        for name, value, bound in zip(self.layout.names, values, self.bounds[:-1], strict=True):
             if not abs(value) <= bound:  # true for a NaN as well
                 raise SimulationError(f"state {name} = {value}: allowed are {-bound:g} to {bound:g}")
         quaternion = values[S.ATTITUDE : S.ATTITUDE + 4]
-        norm = np.linalg.norm(quaternion)
+        norm = math.sqrt(sum(float(part) * float(part) for part in quaternion))
         if not 0.5 <= norm <= 2.0:
             raise SimulationError(f"state attitude has a norm of {norm:g}: allowed are 0.5 to 2, a unit quaternion")
         if abs(norm - 1.0) > UNIT:  # what has been normalised once stays as it is, bit for bit
             values[S.ATTITUDE : S.ATTITUDE + 4] = quaternion / norm
         values[self._held] = 0.0
-        lowest, ground = -lowest_point(self._params, values), -self._bounds[-1]
+        deepest = np.zeros((1, 1))
+        lowest_point(self.model.rotors, values[:, np.newaxis], deepest)
+        lowest, ground = -float(deepest[0, 0]), -self.bounds[-1]
         if lowest <= ground:
             raise SimulationError(
                 f"state position: the aircraft reaches down to {lowest:g} m: allowed is above {ground:g} m, the ground"
@@ -358,154 +274,91 @@ class Simulation:
             The next step would leave the finite or the plausible: the message names step, time and state. The state
             is that of the last good step.
         """
-        done, culprit = advance(
-            self._params,
-            self.state,
-            self.swashplate,
-            self._azimuth0,
-            self.step,
-            self.steps_per_tick,
-            self.step_size,
-            self._air,
-            self._method,
-            self._bounds,
-            self._work,
+        engine, culprit = self.engine, np.full(1, FLYING)
+        advance(
+            *(
+                engine.code.derivative,
+                engine.model,
+                _single(self.state),
+                _single(self.swashplate),
+                _single(self.azimuth0),
+            ),
+            *(self.step, self.steps_per_tick, self.step_size, _single(self._air), self.method, _single(self.bounds)),
+            *(engine.work, engine.tick, engine.tick.done, culprit),
         )
-        self.step += done
-        if culprit >= 0:
-            raise self._end(culprit)
+        self.step += int(engine.tick.done[0])
+        if culprit[0] != FLYING:
+            raise self.end(int(culprit[0]), float(engine.tick.last[min(culprit[0], engine.size - 1), 0]))
         self._air = self._field.next_tick()
 
-    def _end(self, culprit: int) -> SimulationError:
-        """Why the flight cannot go on: a state that the next step would take beyond the plausible."""
+    def end(self, culprit: int, value: float) -> SimulationError:
+        """Why the flight cannot go on: a state that the next step would take to a value beyond the plausible."""
         if culprit == self.layout.size:
-            speed = float(np.linalg.norm(self.state[S.VELOCITY : S.RATES]))
+            speed = math.sqrt(sum(float(part) ** 2 for part in self.state[S.VELOCITY : S.RATES]))
             return SimulationError(
                 f"ground contact after step {self.step} (t = {self.time:.4f} s) at {speed:.3g} m/s:"
-                f" the ground is at {-self._bounds[-1]:g} m"
+                f" the ground is at {-self.bounds[-1]:g} m"
             )
-        value = self._work.stages[0][culprit]
         return SimulationError(
             f"step {self.step + 1} (t = {(self.step + 1) * self.step_size:.4f} s) would take"
             f" {self.layout.names[culprit]} to {value:g}: plausible are magnitudes"
-            f" up to {self._bounds[culprit]:g}"
+            f" up to {self.bounds[culprit]:g}"
         )
 
-    def fly(
-        self, swashplates: Array, ticks: int, every: int = 1, loaded: bool = True
-    ) -> tuple[Rows, Array, SimulationError | None]:
-        """Fly many ticks in one call of compiled code, during which other threads go on.
+    def fly(self, swashplates: Array, ticks: int, every: int = 1, loaded: bool = True) -> Flown:
+        """Fly many ticks in one call of compiled code, see `Formation.fly`.
 
         To the last bit it is what `set_swashplate`, `snapshot` and `advance` give tick by tick.
-
-        Parameters
-        ----------
-        swashplates : ndarray, shape (ticks, n_rotors, 3) or (ticks + 1, n_rotors, 3)
-            Angles of each tick [rad], see `checked_swashplate`. One more is in force at the end of the flight, which
-            then is told of as well.
-        ticks : int
-        every : int
-            Ticks from one row of the result to the next, counted from the start of the flight.
-        loaded : bool
-            False leaves accelerations and loads out.
-
-        Returns
-        -------
-        rows : Rows
-        working : ndarray, shape (n, n_rotors, WORKING_SIZE)
-            Working states of the rotors, see `Snapshot`, once every tenth of a second.
-        fault : SimulationError or None
-            Why the flight ended before its last tick, see `advance`; it cannot go on then.
         """
-        air = np.concatenate([self._air[np.newaxis], self._field.next_ticks(ticks)])
-        begin = self.step // self.steps_per_tick
-        told, watched = (np.arange(-(-begin // n) * n - begin, len(swashplates), n) for n in (every, self._watch))
-        rows = self._rows((begin + told) * self.steps_per_tick, swashplates[told], air[told], loaded)
-        x, first, options = self.state, swashplates[0], (self._method, self._bounds, self._work)
-        start = (self._azimuth0, self.step, self.steps_per_tick, self.step_size)
-        row = np.zeros((len(self._azimuth0), WORKING_SIZE))
-        working = np.zeros((len(watched), *row.shape))
-        machine_code = (
-            address(advance, self._params, x, first, *start, air[0], *options),
-            address(derivative, self._params, x, first, self._azimuth0, self._slope[:3], self._work, self._slope),
-            address(working_state, self._params, x, self._stall, self._work, row),
-        )
-        offset, look = (int(places[0]) if len(places) else len(swashplates) for places in (told, watched))
-        outputs = (rows.azimuth, rows.wind, rows.state, rows.acceleration, rows.loads, self._slope)
-        steps = (begin + watched) * self.steps_per_tick
-        looks = (
-            self._stall,
-            look,
-            self._watch,
-            self._azimuths(steps[:, np.newaxis]),
-            self._air_at(steps, air[watched]),
-        )
-        self.step, culprit = fly(
-            *(*machine_code, self._params, x, *start, *options),
-            *(swashplates, air, ticks, offset, every, loaded, *outputs, *looks, working),
-        )
-        working = working[steps <= self.step]
-        self._air, self.swashplate = air[ticks], swashplates[-1].copy()
-        rows = rows.first(int(np.count_nonzero(rows.step <= self.step)))
-        if loaded:
-            for state, acceleration in zip(rows.state, rows.acceleration, strict=True):
-                acceleration += self._gravity(state)
-        return rows, working, self._end(culprit) if culprit >= 0 else None
+        return Formation([self]).fly([swashplates], ticks, every, loaded)[0]
 
-    def _rows(self, steps: NDArray[np.int64], swashplates: Array, air: Array, loaded: bool) -> Rows:
-        """Rows of which the flight fills in state, force and loads."""
-        count, rotors = len(steps), len(self._azimuth0)
-        return Rows(
-            step=steps,
-            time=np.multiply(steps, self.step_size, dtype=float),
-            state=np.zeros((count, self.layout.size)),
-            acceleration=np.zeros((count, 3)),
-            swashplate=swashplates,
-            azimuth=np.array([self._azimuths(step) for step in steps]).reshape(count, rotors),
-            loads=np.zeros((count, rotors, P.LOAD_SIZE)),
-            wind=self._air_at(steps, air) if loaded else np.zeros((count, 3)),
-        )
+    def go_on(self, step: int, state: Array, air: Array, swashplate: Array) -> None:
+        """Take over what a flight in a formation has come to, with the air of its next tick."""
+        self.step, self.state, self._air, self.swashplate = step, state, air, swashplate
 
-    def _air_at(self, steps: NDArray[np.int64], air: Array) -> Array:
+    def air_ahead(self, ticks: int) -> Array:
+        """Air of this tick and of so many that follow, shape (ticks + 1, WIND_SIZE)."""
+        return np.concatenate([self._air[np.newaxis], self._field.next_ticks(ticks)])
+
+    def air_at(self, steps: NDArray[np.int64], air: Array) -> Array:
         """Velocity of the air at the beginnings of ticks, NED [m/s], shape (n, 3)."""
-        velocities = np.zeros((len(steps), 3))
-        for row, step, velocity in zip(air, steps, velocities, strict=True):
-            wind_at(row, step * self.step_size, 0.0, velocity)
-        return velocities
+        velocities = np.zeros((len(steps), 3, 1))
+        times = np.multiply(steps, self.step_size, dtype=float)
+        winds_at(np.ascontiguousarray(air)[..., np.newaxis], times, self.model.rotors, velocities)
+        return velocities[..., 0]
 
-    def _gravity(self, state: Array) -> Array:
-        """Gravity in body axes [m/s^2], shape (3,)."""
-        down: Array = rotation_matrix(state[S.ATTITUDE : S.ATTITUDE + 4])[2]
-        return down * self._params.air[P.GRAVITY]
-
-    def _azimuths(self, step: int | NDArray[np.int64]) -> Array:
-        """Azimuth of every rotor at a step, shape (n_rotors,) [rad], 0 to 2 pi; of steps (n, 1) shape (n, n_rotors)."""
-        turned: Array = self._azimuth0 + self._params.rotor[:, P.SPEED] * self.step_size * step
+    def azimuths(self, steps: NDArray[np.int64]) -> Array:
+        """Azimuth of every rotor at steps, shape (n, n_rotors) [rad], 0 to 2 pi."""
+        turned: Array = self.azimuth0 + self._speeds * (self.step_size * steps[:, np.newaxis])
         return turned % (2 * math.pi)
 
     def snapshot(self) -> Snapshot:
         """The present instant, with loads and accelerations under the swashplate angles now in force."""
-        azimuth = self._azimuths(self.step)
-        air = np.zeros(3)
-        wind_at(self._air, self.time, 0.0, air)
-        derivative(self._params, self.state, self.swashplate, azimuth, air, self._work, self._slope)
+        engine, now = self.engine, np.array([self.step])
+        azimuth, air = self.azimuths(now)[0], self.air_at(now, self._air[np.newaxis])[0]
+        working = engine.memory(engine.rotors, WORKING_SIZE)
+        derivative(
+            *(engine.model, _single(self.state), _single(self.swashplate), _single(azimuth), _single(air)),
+            *(engine.work, engine.tick.slopes[0], True),
+        )
+        working_state(engine.model, engine.work, working)
+        down = down_of(self.state[np.newaxis, S.ATTITUDE : S.VELOCITY])[0]
         return Snapshot(
             step=self.step,
             time=self.time,
             state=self.state.copy(),
-            acceleration=self._work.vector[:3] + self._gravity(self.state),
+            acceleration=engine.work.vector[:3, 0] + down * self.aircraft.environment.gravity,
             swashplate=self.swashplate.copy(),
             azimuth=azimuth,
-            loads=self._work.loads.copy(),
+            loads=engine.work.load_rows.reshape(engine.rotors, -1).copy(),
             wind=air,
-            working=self._working(),
+            working=working[..., 0],
         )
 
-    def _working(self) -> Array:
-        """Working states at the instant of the last derivative."""
-        rows = np.empty((len(self._azimuth0), WORKING_SIZE))
-        working_state(self._params, self.state, self._stall, self._work, rows)
-        return rows
+
+def _single(values: Array) -> Array:
+    """Numbers of a flight as the only lane: the same memory."""
+    return values.reshape(-1, 1)
 
 
 def begun(aircraft: Aircraft, events: Sequence[Event], **options: Any) -> Simulation:
@@ -642,8 +495,9 @@ def trimmed_state(
     heading = checks.number("heading", heading, -4 * math.pi, 4 * math.pi, "rad", SimulationError)
     state = aircraft.layout.from_linear(point.state, heading)
     state[: S.ATTITUDE] = position
+    north, east, down = np.asarray(wind, dtype=float).tolist()
     to_earth = rotation_matrix(euler_to_quaternion(heading, point.pitch, point.roll))
-    state[S.VELOCITY : S.RATES] += to_earth.T @ np.asarray(wind, dtype=float)
+    state[S.VELOCITY : S.RATES] += to_earth[0] * north + to_earth[1] * east + to_earth[2] * down
     return state
 
 
@@ -786,42 +640,138 @@ def fly_commands(
     SimulationError
         The flight cannot begin.
     """
-    checks.instance("aircraft", aircraft, Aircraft, SimulationError)
-    duration = checks.number("duration", duration, 0.0, 1e6, "s", SimulationError)
-    actuators = checks.flag("actuators", actuators, SimulationError)
-    air = Wind() if wind is None else wind
-    checks.instance("wind", air, Wind, SimulationError)
-    state = trimmed_state(aircraft, start, wind=air.velocity) if isinstance(start, TrimPoint) else start
-    stand = start.swashplate if isinstance(start, TrimPoint) else None
-    command = _command(controls)
-    pilot = (_Mixed if actuators else _Direct)(aircraft, command, stand)
-    simulation = Simulation(aircraft, state, pilot.angles(command(0, 0.0), 0.0), wind=air, **options)
-    ticks = round(duration / simulation.tick)
-    _check_rows(controls, ticks, simulation.tick)
-    blocks: list[tuple[Rows, Array]] = []
-    looks: list[Array] = []
-    fault: SimulationError | None = None
-    size = _block(simulation)
-    for begin in range(0, ticks + 1, size):
+    sortie = Sortie(
+        aircraft, start, controls, duration, every=every, loaded=loaded, wind=wind, actuators=actuators, **options
+    )
+    fly_together([sortie])
+    return sortie.result()
+
+
+class Sortie:
+    """A flight under commands, see `fly_commands`: what it is to be, and what became of it.
+
+    Attributes
+    ----------
+    simulation : Simulation
+    ticks : int
+        Of the whole flight.
+    fault : SimulationError or None
+        Why it has ended early.
+    """
+
+    def __init__(
+        self,
+        aircraft: Aircraft,
+        start: TrimPoint | ArrayLike,
+        controls: Commands,
+        duration: float,
+        *,
+        every: int = 1,
+        loaded: bool = True,
+        wind: Wind | None = None,
+        actuators: bool = False,
+        **options: Any,
+    ) -> None:
+        checks.instance("aircraft", aircraft, Aircraft, SimulationError)
+        duration = checks.number("duration", duration, 0.0, 1e6, "s", SimulationError)
+        actuators = checks.flag("actuators", actuators, SimulationError)
+        air = Wind() if wind is None else wind
+        checks.instance("wind", air, Wind, SimulationError)
+        state = trimmed_state(aircraft, start, wind=air.velocity) if isinstance(start, TrimPoint) else start
+        stand = start.swashplate if isinstance(start, TrimPoint) else None
+        command = _command(controls)
+        self._pilot = (_Mixed if actuators else _Direct)(aircraft, command, stand)
+        angles = self._pilot.angles(command(0, 0.0), 0.0)
+        self.simulation = Simulation(aircraft, state, angles, wind=air, **options)
+        self.ticks = round(duration / self.simulation.tick)
+        _check_rows(controls, self.ticks, self.simulation.tick)
+        self.every, self.loaded = every, loaded
+        self.fault: SimulationError | None = None
+        self._blocks: list[tuple[Rows, Array]] = []
+        self._looks: list[Array] = []
+        self._given, self._begin = np.empty(0), 0
+        self._wrong: SimulationError | None = None
+
+    def commanded(self, begin: int, end: int) -> Array:
+        """Swashplate angles [rad] of ticks, as many as there are right commands for."""
+        self._given, angles, self._wrong = _angles(self.simulation, self._pilot, begin, end)
+        self._begin = begin
+        return angles
+
+    def take(self, flown: Flown) -> None:
+        """Take over what the ticks that were commanded have given."""
+        ticks = flown.rows.step // self.simulation.steps_per_tick - self._begin
+        count = int(np.count_nonzero(ticks < len(self._given)))
+        self._blocks.append((flown.rows.first(count), self._given[ticks[:count]]))
+        self._looks.append(flown.working[flown.watched < len(self._given)])
+        self.fault = flown.fault if flown.ticks < len(self._given) else None
+        self.fault = self.fault or self._wrong
+
+    def end(self) -> None:
+        """End where not even the first tick has a right command."""
+        self.fault = self._wrong
+
+    def result(self) -> tuple[History, SimulationError | None]:
+        """See `fly_commands`."""
+        if not self._blocks and self.fault is not None:
+            raise self.fault
+        aircraft = self.simulation.aircraft
+        working = np.concatenate(self._looks)
+        told = (*flight_warnings(aircraft, working), *self._pilot.told(self.simulation.tick))
+        return History(_histories(aircraft, self._blocks, self.loaded), told), self.fault
+
+
+def fly_together(sorties: Sequence[Sortie]) -> None:
+    """Fly one flight, or several side by side, to their ends: each as it would on its own to the last bit.
+
+    Parameters
+    ----------
+    sorties : sequence of Sortie
+        One, or up to `sbs_sim.model.packing.lane_count()` with `structure` and ticks in common.
+    """
+    formation, first = Formation([sortie.simulation for sortie in sorties]), sorties[0]
+    size = _block(first.simulation, len(sorties))
+    for begin in range(0, first.ticks + 1, size):
         interruption.look()
-        end = min(begin + size, ticks + 1)
-        given, angles, wrong = _angles(simulation, pilot, begin, end)
-        if len(angles):
-            rows, working, fault = simulation.fly(angles, min(len(angles), ticks - begin), every, loaded)
-            blocks.append((rows, given[rows.step // simulation.steps_per_tick - begin]))
-            looks.append(working)
-        fault = fault or wrong
-        if fault is not None:
-            break
-    if not blocks and fault is not None:
-        raise fault
-    told = (*flight_warnings(aircraft, np.concatenate(looks)), *pilot.told(simulation.tick))
-    return History(_histories(aircraft, blocks, loaded), told), fault
+        end = min(begin + size, first.ticks + 1)
+        flying = [sortie.fault is None for sortie in sorties]
+        angles = [
+            sortie.commanded(begin, end) if one else np.empty(0) for sortie, one in zip(sorties, flying, strict=True)
+        ]
+        most = max(map(len, angles))
+        if most:
+            padded = [_padded(own, most, sortie.simulation) for own, sortie in zip(angles, sorties, strict=True)]
+            flown = formation.fly(padded, min(most, first.ticks - begin), first.every, first.loaded)
+        for lane, (sortie, own) in enumerate(zip(sorties, angles, strict=True)):
+            if flying[lane] and len(own):
+                sortie.take(flown[lane])
+            elif flying[lane]:
+                sortie.end()
+            if sortie.fault is not None:
+                formation.retire(lane)
+        if all(sortie.fault is not None for sortie in sorties):
+            return
 
 
-def _block(simulation: Simulation) -> int:
+def _padded(angles: Array, count: int, simulation: Simulation) -> Array:
+    """Angles of as many ticks; what is missing is of no meaning."""
+    last = angles[-1] if len(angles) else simulation.swashplate
+    return np.concatenate([angles.reshape(-1, *last.shape), np.tile(last, (count - len(angles), 1, 1))])
+
+
+def structure(simulation: Simulation) -> Any:
+    """What flights that are flown side by side have in common."""
+    aircraft, model = simulation.aircraft, simulation.model
+    blades = tuple(rotor.blades for rotor in aircraft.rotors)
+    return (
+        *(blades, aircraft.options, tuple(map(id, aircraft.tables)), simulation.steps_per_tick, simulation.method),
+        *(simulation.tick, simulation.step, model.switches.tobytes()),
+    )
+
+
+def _block(simulation: Simulation, flights: int) -> int:
     """Ticks of a call that takes no longer than an interruption may wait."""
-    elements = simulation.aircraft.layout.blade_count * simulation.aircraft.options.elements
+    elements = flights * simulation.aircraft.layout.blade_count * simulation.aircraft.options.elements
     return max(1, min(BLOCK, BLOCK_ELEMENTS // (simulation.steps_per_tick * elements)))
 
 
@@ -967,8 +917,8 @@ def _histories(aircraft: Aircraft, blocks: Sequence[tuple[Rows, Array]], loaded:
     speeds = np.array([rotor.speed for rotor in aircraft.rotors])
     return flown | {
         "acceleration": np.concatenate([rows.acceleration for rows, _ in blocks]),
-        "thrust": loads[:, :, P.THRUST],
-        "torque": loads[:, :, P.TORQUE],
-        "power": loads[:, :, P.TORQUE] * speeds,
+        "thrust": loads[:, :, R.THRUST],
+        "torque": loads[:, :, R.TORQUE],
+        "power": loads[:, :, R.TORQUE] * speeds,
         S.AIRSPEED: np.linalg.norm(velocity - to_body(attitude, wind), axis=1),
     }

@@ -3,15 +3,18 @@
 import copy
 import functools
 
+import numba
 import numpy as np
 
 from sbs_sim.aircraft import Aircraft, config_folder
-from sbs_sim.model import params as P
+from sbs_sim.engine import Engine
+from sbs_sim.lanes import as_lanes, as_records
 from sbs_sim.model import state as S
 from sbs_sim.model import wind as W
-from sbs_sim.model.average import averaged_derivative
+from sbs_sim.model.average import azimuths
 from sbs_sim.model.dynamics import derivative
-from sbs_sim.model.integrate import RK4, advance
+from sbs_sim.model.frames import ONE
+from sbs_sim.model.integrate import FLYING, RK4, TSIT5, advance
 
 CALM = np.zeros(3)
 VACUUM = {"air_density": 0.0}
@@ -97,17 +100,26 @@ def linear_airfoil(path, slope=5.73, drag=0.01, linear_deg=60.0):
 class Model:
     """The compiled model of an aircraft: its derivative, averages and flights as plain calls."""
 
-    def __init__(self, aircraft, lead_lag=True, cyclic_inflow=True):
+    def __init__(self, aircraft, lead_lag=True, cyclic_inflow=True, lanes="blades"):
         self.aircraft, self.layout = aircraft, aircraft.layout
         self.lead_lag, self.cyclic_inflow = lead_lag, cyclic_inflow
-        self.params = aircraft.params(lead_lag, cyclic_inflow)
-        self.work = P.make_work(self.params)
+        self.engine = Engine(aircraft.arranged(lead_lag, cyclic_inflow, lanes), TSIT5)
+        self.points = Engine(aircraft.arranged(lead_lag, cyclic_inflow, "points"))
         self.speeds = np.array([rotor.speed for rotor in aircraft.rotors])
 
     @property
     def no_swash(self):
         """Swashplates at zero, shape (n_rotors, 3)."""
         return np.zeros((len(self.speeds), 3))
+
+    @property
+    def loads(self):
+        """Loads of the last derivative, shape (n_rotors, LOAD_SIZE)."""
+        return self.engine.work.load_rows[:, 0].reshape(len(self.speeds), -1)
+
+    def lanes(self, values):
+        """Numbers of one flight as the engine takes them."""
+        return self.engine.lanes([np.array(values, dtype=float).ravel()])
 
     def state(self, velocity=(0.0, 0.0, 0.0), rates=(0.0, 0.0, 0.0), lambda0=0.0):
         """Return a level state with undeflected blades."""
@@ -119,48 +131,41 @@ class Model:
         return x
 
     def derivative(self, x, swash=None, psi=None, wind=CALM):
-        """Return the derivative of a state, shape (size,); the loads are left in `self.work.loads`."""
-        dx = np.empty(self.layout.size)
+        """Return the derivative of a state, shape (size,); the loads are `loads` then."""
+        dx, engine = self.lanes(x), self.engine
+        swash = self.no_swash if swash is None else swash
+        psi = np.zeros(len(self.speeds)) if psi is None else psi
         derivative(
-            self.params,
-            np.array(x, dtype=float),
-            self.no_swash if swash is None else np.array(swash, dtype=float),
-            np.zeros(len(self.speeds)) if psi is None else np.array(psi, dtype=float),
-            np.array(wind, dtype=float),
-            self.work,
-            dx,
+            *(engine.model, self.lanes(x), self.lanes(swash), self.lanes(psi), self.lanes(wind), engine.work, dx, True)
         )
-        return dx
+        return dx[:, 0].copy()
 
     def averaged(self, x, swash=None, azimuth_count=12):
         """Return the averaged derivative, shape (size,), and the averaged loads, shape (n_rotors, LOAD_SIZE)."""
-        dx, loads = np.empty(self.layout.size), np.empty((len(self.speeds), P.LOAD_SIZE))
         swash = self.no_swash if swash is None else np.array(swash, dtype=float)
-        averaged_derivative(
-            self.params, np.array(x, dtype=float), swash, azimuth_count, np.zeros(3), self.work, dx, loads
-        )
-        return dx, loads
+        psi = azimuths(self.layout.blades, azimuth_count)
+        rates, loads = self.points.average(np.array(x, dtype=float), swash, psi)
+        return rates[: self.layout.size], loads
 
     def fly(self, x, steps, h, swash=None, psi0=None, first_step=0, method=RK4, wind=CALM):
         """Return the state after steps of length h [s], whatever becomes of it."""
-        x = np.array(x, dtype=float)
         air = np.zeros(W.WIND_SIZE)
         air[W.STEADY : W.STEADY + 3] = wind
-        done, _ = advance(
-            self.params,
-            x,
-            self.no_swash if swash is None else np.array(swash, dtype=float),
-            np.zeros(len(self.speeds)) if psi0 is None else np.array(psi0, dtype=float),
-            first_step,
-            steps,
-            h,
-            air,
-            method,
-            np.full(self.layout.size + 1, np.inf),
-            self.work,
-        )
+        swash = self.no_swash if swash is None else swash
+        psi0 = np.zeros(len(self.speeds)) if psi0 is None else psi0
+        bounds = np.full(self.layout.size + 1, np.inf)
+        done, _, x = self.tick(x, swash, psi0, first_step, steps, h, air, method, bounds)
         assert done == steps
         return x
+
+    def tick(self, x, swash, psi0, first_step, steps, h, air, method, bounds):
+        """Steps made, the culprit, and the state after a tick of `advance`."""
+        engine, culprit, x = self.engine, np.full(self.engine.n, FLYING), self.lanes(x)
+        advance(
+            *(engine.code.derivative, engine.model, x, self.lanes(swash), self.lanes(psi0), first_step, steps, h),
+            *(self.lanes(air), method, self.lanes(bounds), engine.work, engine.tick, engine.tick.done, culprit),
+        )
+        return int(engine.tick.done[0]), int(culprit[0]), x[:, 0].copy()
 
     def azimuth(self, steps, h, psi0=0.0):
         """Return the azimuths of all rotors after steps of length h [s], shape (n_rotors,)."""
@@ -210,6 +215,25 @@ class Model:
         raise AssertionError(f"the rotors did not settle: last step {np.abs(step).max():.3g}")
 
 
+def model_numbers(aircraft):
+    """Arrays of numbers of the compiled model by the names of their fields."""
+    found = {}
+    for name, part in aircraft.model()._asdict().items():
+        if name == "places":
+            found |= {f"places.{field}": values for field, values in part._asdict().items()}
+        elif part.dtype.names:
+            found |= {f"{name}.{field}": part[field] for field in part.dtype.names}
+        else:
+            found[name] = part
+    return found
+
+
+def is_finite_model(aircraft):
+    """Whether all numbers of the compiled model are; Reynolds numbers that a table does not have stand as infinity."""
+    numbers = model_numbers(aircraft)
+    return not np.isnan(numbers.pop("knots")).any() and all(np.isfinite(part).all() for part in numbers.values())
+
+
 def mirrored_data(data):
     """Return the mapping of the aircraft's image in the plane y = 0."""
     image = copy.deepcopy(data)
@@ -250,3 +274,16 @@ def heading_matrix(heading):
     """Return the rotation by a heading [rad] about down, shape (3, 3)."""
     c, s = np.cos(heading), np.sin(heading)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def wind_velocity(air, time, fraction=0.0):
+    """Velocity of the air, NED [m/s], shape (3,), of the array of a tick at a time [s] that far through it."""
+    out = np.empty((3, 1))
+    _blow(np.asarray(air).reshape(-1, 1), time, fraction, ONE, out)
+    return out[:, 0]
+
+
+@numba.njit(error_model="numpy")
+def _blow(air, time, fraction, like, out):
+    records = as_records(like)
+    W.wind_at(as_lanes(air, records), time, fraction, as_lanes(out, records))

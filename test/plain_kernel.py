@@ -80,7 +80,8 @@ class PlainParams(NamedTuple):
     airfoil : ndarray of AIRFOIL, shape (n_airfoils,)
         Index of the last Reynolds interval, step of the angles, which start at -pi.
     reynolds : ndarray, shape (n_airfoils, most Reynolds numbers)
-    cl, cd : ndarray, shape (n_airfoils, most Reynolds numbers, most angles)
+    cl, cd : ndarray, shape (n_airfoils, most Reynolds numbers, most angles, 4)
+        Coefficients of 1, x, x^2, x^3 from each angle to the next, x = 0 to 1.
     """
 
     body: np.ndarray
@@ -142,9 +143,19 @@ def make_params(ac):
         element=np.stack([elements(rotor, ac.options.elements) for rotor in ac.rotors]),
         airfoil=np.array([(len(t.reynolds) - 2, 2 * np.pi / (len(t.alpha) - 1)) for t in tables], AIRFOIL),
         reynolds=padded([table.reynolds for table in tables]),
-        cl=padded([table.cl for table in tables]),
-        cd=padded([table.cd for table in tables]),
+        cl=padded([polynomials(table.cl, ac.options.interpolation) for table in tables]),
+        cd=padded([polynomials(table.cd, ac.options.interpolation) for table in tables]),
     )
+
+
+def polynomials(values, interpolation):
+    """Return the coefficients of 1, x, x^2, x^3 between angles (section 4.3), shape (n_re, n_alpha - 1, 4)."""
+    start, rise = values[:, :-1], np.diff(values)
+    before = np.roll(rise, 1, axis=1)
+    slope = np.sign(rise) * np.minimum(np.abs(before + rise) / 2, 3 * np.minimum(np.abs(before), np.abs(rise)))
+    left = np.where(before * rise > 0, slope, 0.0) if interpolation == "smooth" else rise
+    right = np.roll(left, -1, axis=1) if interpolation == "smooth" else rise
+    return np.stack([start, left, 3 * rise - 2 * left - right, left + right - 2 * rise], axis=-1)
 
 
 def make_work(ac):
@@ -497,10 +508,15 @@ def blade_terms(p, j, k, x, swash, psi, om, flow, lambda0, lambdas, lambdac, lea
 
 
 @compiled
+def cubic(c, x):
+    return c[0] + x * (c[1] + x * (c[2] + x * c[3]))
+
+
+@compiled
 def section_loads(p, j, pitch, u_T, u_T_slope, u_P, u_P_slope):
     """Integrals of dF_n, dF_t [N], s dF_n and s dF_t [N m] along a blade (4.4, 4.5).
 
-    Lift and drag are bilinear in the table; the Reynolds number is clamped, the angle is periodic.
+    Lift and drag are cubic in the angle, which is periodic, and linear in the Reynolds number, which is clamped.
     """
     density, viscosity = p.body[0].density, p.body[0].viscosity
     foil = p.rotor[j].airfoil
@@ -521,10 +537,8 @@ def section_loads(p, j, pitch, u_T, u_T_slope, u_P, u_P_slope):
             i += 1
         low, high = p.reynolds[foil, i], p.reynolds[foil, i + 1]
         y = min(max((reynolds - low) / (high - low), 0.0), 1.0)
-        cl_low = p.cl[foil, i, a] * (1 - x) + p.cl[foil, i, a + 1] * x
-        cl_high = p.cl[foil, i + 1, a] * (1 - x) + p.cl[foil, i + 1, a + 1] * x
-        cd_low = p.cd[foil, i, a] * (1 - x) + p.cd[foil, i, a + 1] * x
-        cd_high = p.cd[foil, i + 1, a] * (1 - x) + p.cd[foil, i + 1, a + 1] * x
+        cl_low, cl_high = cubic(p.cl[foil, i, a], x), cubic(p.cl[foil, i + 1, a], x)
+        cd_low, cd_high = cubic(p.cd[foil, i, a], x), cubic(p.cd[foil, i + 1, a], x)
         cl = element.lift * (cl_low * (1 - y) + cl_high * y)
         cd = cd_low * (1 - y) + cd_high * y
         pressure = density / 2 * element.area * speed

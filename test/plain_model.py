@@ -22,6 +22,7 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 #: Smooth floor of the inflow's total velocity V_T, in units of the tip speed (theory.md section 6).
 INFLOW_SPEED_FLOOR = 1e-5
@@ -349,20 +350,37 @@ def make_blades(ac, state, psi):
 # ------------------------------------------------------------------------------------------------------------
 
 
-def airfoil_coefficients(airfoil, reynolds, alpha):
-    """Return cl, cd by linear interpolation in Reynolds number (clamped) and in alpha [rad] (periodic).
+def airfoil_coefficients(airfoil, reynolds, alpha, interpolation):
+    """Return cl, cd: linear in Reynolds number (clamped), periodic and "linear" or "smooth" in alpha [rad].
 
     The table's cl and cd have shape (number of Reynolds numbers, number of angles).
     """
     table_reynolds = np.asarray(airfoil.reynolds, dtype=float)
     table_alpha = np.asarray(airfoil.alpha, dtype=float)
     alpha = (alpha - table_alpha[0]) % (2 * np.pi) + table_alpha[0]
-    cl_of_reynolds = [np.interp(alpha, table_alpha, row) for row in airfoil.cl]
-    cd_of_reynolds = [np.interp(alpha, table_alpha, row) for row in airfoil.cd]
+    along = {"linear": np.interp, "smooth": monotone_cubic}[interpolation]
+    cl_of_reynolds = [along(alpha, table_alpha, row) for row in airfoil.cl]
+    cd_of_reynolds = [along(alpha, table_alpha, row) for row in airfoil.cd]
     return (
         np.interp(reynolds, table_reynolds, cl_of_reynolds),
         np.interp(reynolds, table_reynolds, cd_of_reynolds),
     )
+
+
+def monotone_cubic(x, places, values):
+    """Return the value at x of the cubic Hermite interpolant of periodic values at even places (section 4.3)."""
+    count, step = len(places) - 1, places[1] - places[0]
+    j = min(int((x - places[0]) / step), count - 1)
+    rises = [values[(j + i) % count + 1] - values[(j + i) % count] for i in (-1, 0, 1)]
+    slopes = [limited_slope(*rises[:2]), limited_slope(*rises[1:])]
+    return CubicHermiteSpline([0.0, 1.0], values[j : j + 2], slopes)((x - places[j]) / step)
+
+
+def limited_slope(before, after):
+    """Return the mean of two rises, none where they differ in sign, and not more than three times either."""
+    if before * after <= 0:
+        return 0.0
+    return np.sign(after) * min(abs(before + after) / 2, 3 * abs(before), 3 * abs(after))
 
 
 def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
@@ -410,7 +428,10 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
         # The section sees the flow across the span only: |V| is the speed in the plane of t and n.
         speed = np.hypot(u_t, u_p)
         cl, cd = airfoil_coefficients(
-            ac.airfoils[rotor.airfoil], speed * chord / air.kinematic_viscosity, pitch - np.arctan2(u_p, u_t)
+            ac.airfoils[rotor.airfoil],
+            speed * chord / air.kinematic_viscosity,
+            pitch - np.arctan2(u_p, u_t),
+            ac.options.interpolation,
         )
         lifting_edge = rotor.tip_loss * rotor.radius - rotor.hinge_offset
         cl = cl * np.clip((lifting_edge - inner) / ds, 0.0, 1.0)
@@ -925,6 +946,7 @@ def table6_aircraft(environment=None, body=None, options=None, rotors=None):
                 "hub_moment": "complete",
                 "flap_inertia": "hinge_to_tip",
                 "elements": 20,
+                "interpolation": "linear",
                 **(options or {}),
             }
         ),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import is_finite_model, model_numbers
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
@@ -260,6 +261,7 @@ OTHER_VALUES = {
     ("name",): "another",
     ("description",): "another",
     ("options", "coupling"): "complete",
+    ("options", "interpolation"): "linear",
     ("options", "hub_moment"): "complete",
     ("options", "flap_inertia"): "hinge_to_tip",
     ("rotors", 0, "name"): "another",
@@ -306,7 +308,7 @@ def flattened(aircraft):
 
 
 def model_arrays(aircraft):
-    return repr([(array.shape, array.tobytes()) for array in aircraft.params()])
+    return repr([(name, array.shape, array.tobytes()) for name, array in model_numbers(aircraft).items()])
 
 
 @pytest.fixture(scope="module")
@@ -353,9 +355,12 @@ def test_the_schema_has_a_key_for_every_field_of_a_rotor():
     assert named == keys
 
 
-def test_every_key_is_demanded_but_the_description_factors_of_mixing_and_the_speed_of_sound():
+def test_every_key_is_demanded_but_the_description_factors_of_mixing_speed_of_sound_and_interpolation():
     for path in LEAVES:
-        if path in (("description",), ("environment", "speed_of_sound")) or "mixing" in path:
+        if (
+            path in (("description",), ("environment", "speed_of_sound"), ("options", "interpolation"))
+            or "mixing" in path
+        ):
             continue
         data = sbs_data()
         del get(data, path[:-1])[path[-1]]
@@ -728,7 +733,7 @@ def test_no_change_of_a_file_gets_more_than_an_aircraft_error(changes):
     if isinstance(result, str):
         assert "\n" not in result
     else:
-        assert all(np.isfinite(array).all() for array in result.params())
+        assert is_finite_model(result)
 
 
 NUMBER_PATHS = [path for path in all_paths(SBS) if type(get(SBS, path)) in (int, float)]
@@ -745,7 +750,7 @@ def test_an_aircraft_that_loads_has_a_finite_model(path, value):
     """Every number that passes the checks is one that the model can be made of."""
     with np.errstate(over="raise", invalid="raise", divide="raise"):
         result = line_or_aircraft(Aircraft.from_dict, changed(path, value))
-        assert isinstance(result, str) or all(np.isfinite(array).all() for array in result.params())
+        assert isinstance(result, str) or is_finite_model(result)
 
 
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -772,7 +777,7 @@ def path_text(path):
 
 
 def same_arrays(one, other):
-    return all(np.array_equal(a, b) for a, b in zip(one.params(), other.params(), strict=True))
+    return model_arrays(one) == model_arrays(other)
 
 
 def value_refusal(path, value):
@@ -887,10 +892,11 @@ def test_a_partial_airfoil_is_extended_for_the_blades_of_each_rotor(tmp_path):
         assert aircraft.parameter_hash == Aircraft.from_dict(data, tmp_path).parameter_hash
         assert list(aircraft.airfoils) == ["wing"]
     # what flies has both: across the wind, with a blade of any pitch, the drag of each
-    params = aircraft.params()
-    first = params.grid_index[:, 0]
-    quarter = params.grid_index[0, 1] // 12 + params.grid_index[0, 1] // 2  # cell that begins at 90 deg, of three turns
-    assert [params.cells[row + quarter, 4] for row in first] == pytest.approx(broadside)
+    model = aircraft.model()
+    first, columns = model.blades["first_row"][::3, 0], int(model.blades["columns"][0, 0])
+    quarter = columns // 12 + columns // 2  # cell that begins at 90 deg, of three turns
+    drag = [model.table[int(row) + quarter] for row in first]  # c_02 and c_03: of x^0, and its slope over Re
+    assert [row[2] + 1e5 * row[3] for row in drag] == pytest.approx(broadside)
     copied, files = aircraft.files()
     assert [rotor["airfoil"] for rotor in copied["rotors"]] == list(files) * 2
 
@@ -957,7 +963,7 @@ def test_a_value_that_cannot_be_set_is_refused_in_one_line(path, value, line):
 def test_no_value_at_no_path_gets_more_than_an_aircraft_error(sbs, path, value):
     result = line_or_aircraft(sbs.with_value, path, value)
     if not isinstance(result, str):
-        assert all(np.isfinite(array).all() for array in result.params())
+        assert is_finite_model(result)
 
 
 # -- aircraft of other shapes -----------------------------------------------------------------------

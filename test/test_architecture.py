@@ -55,7 +55,7 @@ def within(item, allowed):
 def test_the_search_finds_what_there_is():
     assert {"sbs_sim", "sbs_sim.aircraft", "sbs_sim.model.state", "sbs_sim.nodes.simulator"} <= set(MODULES)
     assert any(is_ros(item) for item in imports_of("sbs_sim.nodes.simulator"))
-    assert "sbs_sim.model.params" in imports_of("sbs_sim.aircraft")
+    assert "sbs_sim.model.records" in imports_of("sbs_sim.aircraft")
     assert {"sbs_sim.commands.trim", "sbs_sim.commands.linearize", "sbs_sim.commands.sweep"} <= set(COMMANDS)
 
 
@@ -69,7 +69,9 @@ ALLOWED = {
     "sbs_sim.checks": ["sbs_sim.errors"],
     "sbs_sim.content": [],
     "sbs_sim.interruption": [],
+    "sbs_sim.lanes": ["sbs_sim.lanes"],
     "sbs_sim.model": [
+        "sbs_sim.lanes",
         "sbs_sim.model",
         "sbs_sim.checks",
         "sbs_sim.content",
@@ -78,7 +80,9 @@ ALLOWED = {
     ],
     "sbs_sim.aircraft_values": ["sbs_sim.checks", "sbs_sim.errors"],
     "sbs_sim.config_file": ["sbs_sim.checks", "sbs_sim.errors"],
+    "sbs_sim.aircraft_model": ["sbs_sim.aircraft", "sbs_sim.model"],
     "sbs_sim.aircraft": [
+        "sbs_sim.aircraft_model",
         "sbs_sim.aircraft_values",
         "sbs_sim.checks",
         "sbs_sim.config_file",

@@ -20,7 +20,7 @@ from helpers import (
 from plain_model import energy, first_moment, mass_points, momentum, multiblade_matrix, rotation_matrix
 
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 
 G = 9.80665
@@ -234,7 +234,7 @@ def test_drives_and_dampers_account_for_the_energy():
     for i in range(steps + 1):
         psi = model.azimuth(i, h)
         model.derivative(x, psi=psi)
-        power = model.work.loads[:, P.TORQUE] @ model.speeds
+        power = model.loads[:, R.TORQUE] @ model.speeds
         for j, rotor in enumerate(aircraft.rotors):
             rates = multiblade_matrix(rotor.blades, psi[j]) @ x[layout.lag_rate(j)]
             rates += rotor.speed * multiblade_matrix(rotor.blades, psi[j], 1) @ x[layout.lag(j)]

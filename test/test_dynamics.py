@@ -25,7 +25,7 @@ from hypothesis import strategies as st
 from plain_model import multiblade_matrix, plain_derivative, random_state
 
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.multiblade import blade_matrix
 
@@ -121,12 +121,12 @@ def largest_error(aircraft, case, lead_lag=True, cyclic_inflow=True):
     # What balances inside a rotor is of the order of its force, whatever is left of it in one component.
     force = np.abs(loads["force"]).max() + 1e-3
     columns = {
-        "thrust": (P.THRUST, force),
-        "torque": (P.TORQUE, force),
-        "force": (slice(P.FORCE, P.FORCE + 3), force),
-        "moment": (slice(P.MOMENT, P.MOMENT + 3), force),
+        "thrust": (R.THRUST, force),
+        "torque": (R.TORQUE, force),
+        "force": (slice(R.FORCE, R.FORCE + 3), force),
+        "moment": (slice(R.MOMENT, R.MOMENT + 3), force),
     }
-    errors += [np.abs(model.work.loads[:, at] - loads[name]).max() / scale for name, (at, scale) in columns.items()]
+    errors += [np.abs(model.loads[:, at] - loads[name]).max() / scale for name, (at, scale) in columns.items()]
     return max(errors)
 
 
@@ -197,9 +197,9 @@ def test_mirrored_aircraft_has_the_mirrored_derivative(seed, name):
     expected = mirrored_state(here.derivative(x, swash, psi, wind))
     found = there.derivative(mirrored_state(x), mirrored_swash(swash), psi, wind * POLAR)
     np.testing.assert_array_less(np.abs(found - expected) / group_scales(aircraft, expected), SYMMETRIC_TO)
-    loads, image_loads = here.work.loads, there.work.loads
+    loads, image_loads = here.loads, there.loads
     size = np.abs(loads).max()
-    for at, sign in ((P.FORCE, POLAR), (P.MOMENT, AXIAL)):
+    for at, sign in ((R.FORCE, POLAR), (R.MOMENT, AXIAL)):
         np.testing.assert_allclose(image_loads[:, at : at + 3], loads[:, at : at + 3] * sign, atol=SYMMETRIC_TO * size)
     np.testing.assert_allclose(image_loads[:, :2], loads[:, :2], atol=SYMMETRIC_TO * size)
 
@@ -384,7 +384,7 @@ def test_hub_moment_of_a_tilted_disc_in_vacuum(options, lead_lag):
         per_blade += lead_lag * a1_hub * stiffness
     else:
         per_blade += rotor.hinge_offset * s1 * stiffness
-    moment = model.averaged(x)[1][0, P.MOMENT : P.MOMENT + 3]
+    moment = model.averaged(x)[1][0, R.MOMENT : R.MOMENT + 3]
     np.testing.assert_allclose(moment / (1.5 * per_blade * tilt), [0, 1, 0], atol=1e-6)
 
 
@@ -398,7 +398,7 @@ def test_paper_coupling_is_the_limit_of_a_heavy_body():
             x[S.RATES : S.BODY_SIZE] = 0.0
             rates = model.derivative(x, swash, psi, wind)
             scales = group_scales(model.aircraft, rates)
-            results.append(np.concatenate([(rates / scales)[S.BODY_SIZE :], model.work.loads.ravel() / 1e3]))
+            results.append(np.concatenate([(rates / scales)[S.BODY_SIZE :], model.loads.ravel() / 1e3]))
         difference = np.abs(results[1] - results[0]).max()
         assert (difference < 1e-4) if equal else (difference > 1e-2)
 
@@ -507,12 +507,12 @@ def test_what_is_switched_off_is_held_and_without_effect(name, lead_lag, cyclic_
         if not cyclic_inflow:
             off[layout.inflow(j).start + 1 : layout.inflow(j).stop] = True
     rates = model.derivative(x, swash, psi, wind)
-    loads = model.work.loads.copy()
+    loads = model.loads.copy()
     np.testing.assert_array_equal(rates[off], 0)
     assert np.all(rates[13:][~off[13:]] != 0)
     x[off] = 0.0
     np.testing.assert_array_equal(model.derivative(x, swash, psi, wind), rates)
-    np.testing.assert_array_equal(model.work.loads, loads)
+    np.testing.assert_array_equal(model.loads, loads)
 
 
 def test_lag_off_is_the_limit_of_a_stiff_lag_hinge():
@@ -535,7 +535,7 @@ def thrust_coefficient(model, x, swash, azimuth_count=12):
     rotor = model.aircraft.rotors[0]
     area, tip = np.pi * rotor.radius**2, rotor.speed * rotor.radius
     density = model.aircraft.environment.air_density
-    return model.averaged(x, swash, azimuth_count)[1][0, P.THRUST] / (density * area * tip**2)
+    return model.averaged(x, swash, azimuth_count)[1][0, R.THRUST] / (density * area * tip**2)
 
 
 @pytest.mark.parametrize("cyclic_inflow", [True, False])
@@ -559,7 +559,7 @@ def test_momentum_theory_with_a_duct(expansion):
     model = Model(stand(environment={"gravity": 0.0}, duct_expansion=expansion))
     rotor, swash = model.aircraft.rotors[0], [[0.15, 0.0, 0.0]]
     x = model.settle(model.state(lambda0=0.05), swash)
-    thrust = model.averaged(x, swash)[1][0, P.THRUST]
+    thrust = model.averaged(x, swash)[1][0, R.THRUST]
     induced = x[model.layout.inflow(0).start] * rotor.speed * rotor.radius
     total = 1.225 * np.pi * rotor.radius**2 * induced**2 / expansion
     assert 2 * expansion * thrust == pytest.approx(total, rel=1e-6)
@@ -659,7 +659,7 @@ def test_windmill_drives_the_shaft():
     assert through < -0.1
     assert lambda0 > 0
     assert thrust_coefficient(model, x, swash) == pytest.approx(2 * lambda0 * abs(through), rel=1e-6)
-    assert model.averaged(x, swash)[1][0, P.TORQUE] < 0
+    assert model.averaged(x, swash)[1][0, R.TORQUE] < 0
 
 
 def test_vacuum_has_neither_loads_nor_nan(sbs):
@@ -667,7 +667,7 @@ def test_vacuum_has_neither_loads_nor_nan(sbs):
     model = Model(build(environment={"air_density": 0.0}))
     x = model.state((10.0, 2.0, 1.0), lambda0=0.05)
     rates = model.derivative(x, np.full((2, 3), 0.1), [0.3, 0.8])
-    np.testing.assert_array_equal(model.work.loads[:, P.THRUST], 0)
+    np.testing.assert_array_equal(model.loads[:, R.THRUST], 0)
     np.testing.assert_allclose(rates[S.VELOCITY : S.BODY_SIZE], [0, 0, 9.80665, 0, 0, 0], atol=1e-10)
     assert np.all(np.isfinite(rates))
 
@@ -700,7 +700,7 @@ def test_three_four_and_five_blades_of_one_solidity_carry_alike(plain_airfoil):
         expected = expected or found
         for value, reference in zip(found, expected, strict=True):
             np.testing.assert_allclose(value, reference, rtol=1e-10, atol=1e-10)
-    assert expected[0][P.THRUST] > 50.0
+    assert expected[0][R.THRUST] > 50.0
 
 
 def test_elements_converge_with_the_second_order(plain_airfoil):
@@ -710,7 +710,7 @@ def test_elements_converge_with_the_second_order(plain_airfoil):
     for elements in counts:
         aircraft = stand(environment={"gravity": 0.0}, airfoil=plain_airfoil, options={"elements": elements})
         loads, _ = averaged_rotor(aircraft, 20)
-        values.append(loads[[P.THRUST, P.TORQUE]])
+        values.append(loads[[R.THRUST, R.TORQUE]])
     changes = np.diff(values, axis=0)
     ratios = changes[:-1] / changes[1:]
     np.testing.assert_allclose(ratios, 4.0, atol=0.2)
@@ -722,8 +722,8 @@ def test_twenty_elements_are_enough_for_the_real_airfoil():
         averaged_rotor(stand(environment={"gravity": 0.0}, options={"elements": elements}), 20)[0]
         for elements in (20, 80)
     ]
-    assert loads[0][P.THRUST] == pytest.approx(loads[1][P.THRUST], rel=2e-3)
-    assert loads[0][P.TORQUE] == pytest.approx(loads[1][P.TORQUE], rel=1e-2)
+    assert loads[0][R.THRUST] == pytest.approx(loads[1][R.THRUST], rel=2e-3)
+    assert loads[0][R.TORQUE] == pytest.approx(loads[1][R.TORQUE], rel=1e-2)
 
 
 def test_thrust_and_torque_by_quadrature(plain_airfoil):
@@ -748,9 +748,9 @@ def test_thrust_and_torque_by_quadrature(plain_airfoil):
     )
     thrust = 3 * np.sum(pressure * (cl * u_t - 0.01 * u_p) * ds)
     torque = 3 * np.sum(pressure * (cl * u_p + 0.01 * u_t) * (rotor.hinge_offset + s) * ds)
-    assert loads[P.THRUST] == pytest.approx(thrust, rel=1e-5)
+    assert loads[R.THRUST] == pytest.approx(thrust, rel=1e-5)
     # the blades accelerate in flap and lag not at all: lag is held, flap turns about an axis across the shaft
-    assert loads[P.TORQUE] == pytest.approx(torque, rel=1e-4)
+    assert loads[R.TORQUE] == pytest.approx(torque, rel=1e-4)
 
 
 # -- truths of hover (section 9) -----------------------------------------------------------------------------
@@ -778,7 +778,7 @@ def test_hub_damping_in_pitch_equals_that_in_roll(name, lead_lag, cyclic_inflow)
             rates = np.zeros(3)
             rates[i] = rate
             x = model.settle(model.state(rates=rates, lambda0=0.05), swash, 24)
-            pair.append(model.averaged(x, swash, 24)[1][0, P.MOMENT : P.MOMENT + 3])
+            pair.append(model.averaged(x, swash, 24)[1][0, R.MOMENT : R.MOMENT + 3])
         moments[axis] = (pair[0] - pair[1]) / 0.1
     roll, pitch = moments["p"][0], moments["q"][1]
     assert roll < 0
@@ -796,7 +796,7 @@ def test_heave_does_not_know_of_cyclic_inflow(name):
         swash, pair = [[0.15, 0.0, 0.0]] * 2, []
         for w in (0.05, -0.05):
             x = model.settle(model.state((0.0, 0.0, w), lambda0=0.05), swash)
-            pair.append(model.averaged(x, swash)[1][:, P.THRUST].sum())
+            pair.append(model.averaged(x, swash)[1][:, R.THRUST].sum())
         slopes.append((pair[0] - pair[1]) / 0.1)
     assert slopes[0] > 0  # sinking increases the thrust
     assert slopes[0] == pytest.approx(slopes[1], rel=1e-2)

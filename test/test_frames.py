@@ -2,21 +2,43 @@
 
 import math
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from sbs_sim.lanes import Vector, as_lanes, as_records
 from sbs_sim.model.frames import (
-    cross,
+    ONE,
+    euler_angles,
     euler_to_quaternion,
     hub_axes,
     quaternion_rates,
     quaternion_to_euler,
+    rotation,
     rotation_matrix,
-    rotation_rows,
+    to_body,
 )
+
+
+@numba.njit
+def _attitude(like, given, out):
+    records = as_records(like)
+    v, found = as_lanes(given, records), as_lanes(out, records)
+    matrix = rotation(v[0], v[1], v[2], v[3])
+    for i, row in enumerate((matrix.x, matrix.y, matrix.z)):
+        found[3 * i], found[3 * i + 1], found[3 * i + 2] = row.x, row.y, row.z
+    found[9], found[10], found[11], found[12] = quaternion_rates(v[0], v[1], v[2], v[3], Vector(v[4], v[5], v[6]))
+
+
+def attitude(quaternion, rates=(0.0, 0.0, 0.0)):
+    """What compiled code makes of an attitude: R_NB, shape (3, 3), and the quaternion's rates, shape (4,)."""
+    out = np.empty((13, 1))
+    _attitude(ONE, np.array([*quaternion, *rates])[:, np.newaxis], out)
+    return out[:9, 0].reshape(3, 3), out[9:, 0]
+
 
 ANGLE = st.floats(-math.pi, math.pi)
 PITCH = st.floats(-math.pi / 2 + 1e-3, math.pi / 2 - 1e-3)
@@ -76,26 +98,31 @@ def test_rotation_matrix(yaw, pitch, roll):
     quaternion = euler_to_quaternion(yaw, pitch, roll)
     expected = body_to_earth(yaw, pitch, roll).as_matrix()
     np.testing.assert_allclose(rotation_matrix(quaternion), expected, atol=1e-14)
-    np.testing.assert_allclose(np.reshape(rotation_rows(*quaternion), (3, 3)), expected, atol=1e-14)
+    np.testing.assert_allclose(attitude(quaternion)[0], expected, atol=1e-14)
 
 
 @given(ANGLE, PITCH, ANGLE, VECTOR)
 def test_quaternion_rates_turn_the_body_at_its_angular_velocity(yaw, pitch, roll, rates):
     quaternion = euler_to_quaternion(yaw, pitch, roll)
     step = 1e-4
-    attitude = Rotation.from_quat(quaternion, scalar_first=True)
+    placed = Rotation.from_quat(quaternion, scalar_first=True)
 
     def turned(sign):
-        later = wxyz(attitude * Rotation.from_rotvec(sign * step * np.array(rates)))
+        later = wxyz(placed * Rotation.from_rotvec(sign * step * np.array(rates)))
         return later * math.copysign(1.0, later @ quaternion)
 
     expected = (turned(1) - turned(-1)) / (2 * step)
-    np.testing.assert_allclose(quaternion_rates(*quaternion, *rates), expected, atol=1e-4)
+    np.testing.assert_allclose(attitude(quaternion, rates)[1], expected, atol=1e-4)
 
 
-@given(VECTOR, VECTOR)
-def test_cross_product(a, b):
-    np.testing.assert_allclose(cross(*a, *b), np.cross(a, b), atol=1e-12)
+@given(ANGLE, PITCH, ANGLE, VECTOR)
+def test_arrays_of_attitudes(yaw, pitch, roll, vector):
+    """Vectors seen from the body, and Euler angles, of many attitudes at once."""
+    quaternion = euler_to_quaternion(yaw, pitch, roll)
+    both = np.array([quaternion, [1.0, 0.0, 0.0, 0.0]])
+    seen = to_body(both, np.array([vector, vector]))
+    np.testing.assert_allclose(seen, [rotation_matrix(quaternion).T @ vector, vector], atol=1e-13)
+    np.testing.assert_allclose(euler_angles(both), [quaternion_to_euler(quaternion), (0, 0, 0)], atol=1e-9)
 
 
 @given(VECTOR)

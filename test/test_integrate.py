@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers import Model, build, linear_airfoil
+from helpers import Model, build, linear_airfoil, wind_velocity
 from test_conservation import ONE_SECOND, PSI, STEP, differences, disturbed
 
 from sbs_sim import Simulation, simulate
@@ -10,7 +10,7 @@ from sbs_sim.errors import SimulationError
 from sbs_sim.model import state as S
 from sbs_sim.model import wind as W
 from sbs_sim.model.frames import euler_to_quaternion
-from sbs_sim.model.integrate import PARTITIONED, RK4, TSIT5, TSITOURAS, advance
+from sbs_sim.model.integrate import PARTITIONED, RK4, TSIT5, TSITOURAS
 from sbs_sim.simulation import trimmed_state
 
 QUARTER = 0.25  # s, ten revolutions
@@ -87,17 +87,14 @@ class Disturbed:
     def slope(self, x, ahead):
         """Derivative so many steps after the first of the tick."""
         psi = self.psi0 + self.model.speeds * self.h * (self.first_step + ahead)
-        air = np.empty(3)
-        W.wind_at(self.air, self.h * (self.first_step + ahead), ahead / self.steps, air)
+        air = wind_velocity(self.air, self.h * (self.first_step + ahead), ahead / self.steps)
         return self.model.derivative(x, self.swash, psi, air)
 
     def flown(self, method, bounds=None):
         """Steps made, the culprit, and the state after a tick of `advance`."""
-        x = self.x.copy()
-        bounds = np.full(x.size + 1, np.inf) if bounds is None else bounds
+        bounds = np.full(self.x.size + 1, np.inf) if bounds is None else bounds
         numbers = (self.first_step, self.steps, self.h)
-        done = advance(self.model.params, x, self.swash, self.psi0, *numbers, self.air, method, bounds, self.model.work)
-        return *done, x
+        return self.model.tick(self.x, self.swash, self.psi0, *numbers, self.air, method, bounds)
 
 
 def unit_attitude(x):

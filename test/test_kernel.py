@@ -14,8 +14,8 @@ CODE = """
     import numpy as np
 
     from sbs_sim import Aircraft, Simulation, linearize, simulate, trim
-    from sbs_sim.model.dynamics import derivative
-    from sbs_sim.model import params as P
+    from sbs_sim.engine import Engine
+    from sbs_sim.model.average import azimuths
     from sbs_sim.simulation import trimmed_state
 
     aircraft = Aircraft.load("sbs")
@@ -35,10 +35,9 @@ CODE = """
         elif what == "linearize":
             results[what] = linearize(aircraft, point=point).a.tobytes()
         elif what == "derivative":
-            params, x = aircraft.params(), trimmed_state(aircraft, point)
-            dx = np.zeros_like(x)
-            derivative(params, x, point.swashplate, np.zeros(2), np.zeros(3), P.make_work(params), dx)
-            results[what] = dx.tobytes()
+            engine, x = Engine(aircraft.arranged(True, True, "blades")), trimmed_state(aircraft, point)
+            rates, _ = engine.average(x, point.swashplate, azimuths(aircraft.layout.blades, 1))
+            results[what] = rates.tobytes()
     for what in sorted(results):
         print(what, hashlib.sha256(results[what]).hexdigest())
 """
@@ -67,7 +66,7 @@ def test_bits_do_not_depend_on_what_was_loaded_first(order):
 PLAIN = """
     import math
     import numba
-    from sbs_sim import Aircraft, Case, linearize, simulate, simulate_batch, sweep, trim
+    from sbs_sim import Aircraft, Case, formation, linearize, simulate, simulate_batch, sweep, trim
     from sbs_sim.model.wind import Wind
 
     small = Aircraft.load("sbs").with_value("options.elements", 2)
@@ -84,7 +83,7 @@ PLAIN = """
         *found.points[0].model.a.ravel(),
         *linearize(small, point=point, method="paper").b.ravel(),
     ]
-    assert numba.config.DISABLE_JIT == (not hasattr(simulate.__globals__["fly"], "overloads"))
+    assert numba.config.DISABLE_JIT == (not hasattr(formation.fly, "overloads"))
     print(batch.errors, found.points[0].error, flights[0].warnings)
     print(*map(repr, map(float, numbers)))
 """

@@ -24,7 +24,9 @@ from sbs_sim import Aircraft
 from sbs_sim.model.ground import lowest_point
 state = np.zeros(49)
 state[2:4] = -30.0, 1.0
-print(lowest_point(Aircraft.load("sbs").params(), state))
+out = np.zeros((1, 1))
+lowest_point(Aircraft.load("sbs").model().rotors, state[:, np.newaxis], out)
+print(out[0, 0])
 """
 
 RESULT = "-29.934\n"  # the rotor planes are 0.066 m below the centre of gravity

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from helpers import Model, build
 
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
-from sbs_sim.model.average import averaged_derivative, azimuths
+from sbs_sim.model.average import azimuths
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
 
-WIND = np.array([1.0, -2.0, 0.5])
 COLUMNS = ("w", "q", "theta", "phi", "r", "b1(1)", "xi0(2)", "dxic(2)", "lambda0(1)", "lambdac(2)")
 
 
@@ -32,7 +31,7 @@ def outputs(model, point, psi):
     """Rates of the linear state, specific force and loads, by the derivative of the simulation state."""
     state, controls = point[:-4], point[-4:]
     x = model.layout.from_linear(state)
-    dx = model.derivative(x, model.aircraft.mix(controls), psi, WIND)
+    dx = model.derivative(x, model.aircraft.mix(controls), psi)
     rates = model.layout.to_linear(dx)  # but for the attitude's
     _, _, q, theta, _, p, phi, r = state[: S.LINEAR_BODY_SIZE]
     # rates of the Euler angles are those that these columns, their axes in the body, make the body rates of
@@ -43,7 +42,7 @@ def outputs(model, point, psi):
     gravity = model.aircraft.environment.gravity
     down = gravity * np.array([-np.sin(theta), sine * np.cos(theta), cosine * np.cos(theta)])
     force = dx[S.VELOCITY : S.RATES] + np.cross(x[S.RATES : S.BODY_SIZE], x[S.VELOCITY : S.RATES]) - down
-    return np.concatenate([rates, force, model.work.loads.ravel()])
+    return np.concatenate([rates, force, model.loads.ravel()])
 
 
 def test_jacobian_is_the_difference_of_the_outputs(model, point):
@@ -53,11 +52,16 @@ def test_jacobian_is_the_difference_of_the_outputs(model, point):
     chosen = [names.index(name) for name in (*COLUMNS, S.CONTROL_NAMES[3])]
     steps = np.zeros(len(point))
     steps[chosen] = step
-    mixing = np.stack([rotor.mixing for rotor in model.aircraft.rotors])
-    size = model.layout.linear_size + SPECIFIC_FORCE_SIZE + 2 * P.LOAD_SIZE
+    mixing = np.concatenate([rotor.mixing for rotor in model.aircraft.rotors])
+    size = model.layout.linear_size + SPECIFIC_FORCE_SIZE + 2 * R.LOAD_SIZE
     found = np.full((1, len(point), size), np.nan)
     given = point.copy()
-    jacobian(model.params, given, mixing, steps, psi, WIND, model.work, model.no_swash, found)
+    engine = model.points
+    memory = engine.memory(len(point)), np.empty((engine.n + 1, size))
+    jacobian(
+        *(engine.code.derivative, engine.model, given, mixing, steps, psi, engine.work, engine.tick),
+        *(*memory, found),
+    )
     np.testing.assert_array_equal(given, point)
     for i in chosen:
         moved = step * np.eye(len(point))[i]
@@ -74,9 +78,8 @@ def test_average_is_the_mean_over_the_azimuths(model, point):
     for k in range(count):
         psi = [2 * np.pi * k / (blades * count) for blades in (3, 4)]
         np.testing.assert_allclose(azimuths((3, 4), count)[k], psi, rtol=1e-15)
-        rates.append(model.derivative(x, swash, psi, WIND))
-        loads.append(model.work.loads.copy())
-    found, found_loads = np.empty(x.size), np.empty((2, P.LOAD_SIZE))
-    averaged_derivative(model.params, x, swash, count, WIND, model.work, found, found_loads)
+        rates.append(model.derivative(x, swash, psi))
+        loads.append(model.loads.copy())
+    found, found_loads = model.averaged(x, swash, count)
     np.testing.assert_allclose(found, np.mean(rates, axis=0), rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(found_loads, np.mean(loads, axis=0), rtol=1e-11, atol=1e-11)

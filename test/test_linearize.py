@@ -10,7 +10,7 @@ from helpers import Model, aircraft_data, build, mirrored_data
 from sbs_sim import Aircraft, linearize, trim
 from sbs_sim.analysis.linearize import difference_steps, jacobians, kinematics, settle, used_states
 from sbs_sim.errors import LinearizationError, TrimError
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import rotation_matrix
 from sbs_sim.simulation import trimmed_state
@@ -126,7 +126,7 @@ def test_control_matrix_is_a_difference_of_trims_loads(sbs, cruise):
         slope = (sides[0][0] - sides[1][0]) / (2 * cruise.steps[n + i])
         assert cruise.b[0, i] == pytest.approx(slope[S.VELOCITY], rel=1e-7, abs=1e-8)
         assert cruise.b[5, i] == pytest.approx(slope[S.RATES], rel=1e-7, abs=1e-8)
-        thrust = (sides[0][1] - sides[1][1])[:, P.THRUST] / (2 * cruise.steps[n + i])
+        thrust = (sides[0][1] - sides[1][1])[:, R.THRUST] / (2 * cruise.steps[n + i])
         rows = [cruise.output_names.index(f"thrust({j})") for j in (1, 2)]
         np.testing.assert_allclose(cruise.d[rows, i], thrust, rtol=1e-7, atol=1e-6)
 
@@ -318,7 +318,7 @@ def test_outputs_follow_from_the_states(sbs, cruise):
     step = 0.05
     up, down = (model.averaged(x + sign * step * np.eye(len(x))[9], cruise.trim.swashplate) for sign in (1, -1))
     rotor = sbs.rotors[0]
-    power = rotor.speed * (up[1] - down[1])[0, P.TORQUE] / (2 * step)
+    power = rotor.speed * (up[1] - down[1])[0, R.TORQUE] / (2 * step)
     assert cruise.c[rows["power(1)"], 1] == pytest.approx(power, rel=1e-6)
     assert cruise.c[rows["specific_force_z"], 1] == pytest.approx((up[0] - down[0])[9] / (2 * step), rel=1e-6)
     assert len(cruise.output_units) == len(cruise.output_names) == len(cruise.c) == len(cruise.d)

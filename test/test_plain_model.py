@@ -449,9 +449,9 @@ def test_airfoil_table():
     )
     expected = (0.5 * 1.5, 0.5 * 2)
     for angle in (np.pi / 4, np.pi / 4 + 2 * np.pi, np.pi / 4 - 4 * np.pi):
-        np.testing.assert_allclose(plain_model.airfoil_coefficients(table, 2e5, angle), expected, rtol=1e-12)
-    np.testing.assert_allclose(plain_model.airfoil_coefficients(table, 1.0, np.pi / 2), (1, 1))
-    np.testing.assert_allclose(plain_model.airfoil_coefficients(table, 1e9, -np.pi / 2), (-2, 3))
+        np.testing.assert_allclose(plain_model.airfoil_coefficients(table, 2e5, angle, "linear"), expected, rtol=1e-12)
+    np.testing.assert_allclose(plain_model.airfoil_coefficients(table, 1.0, np.pi / 2, "linear"), (1, 1))
+    np.testing.assert_allclose(plain_model.airfoil_coefficients(table, 1e9, -np.pi / 2, "linear"), (-2, 3))
 
 
 def level_state(ac, lambda0=0.0, velocity=(0.0, 0.0, 0.0)):
@@ -485,7 +485,7 @@ def test_thrust_and_torque_by_quadrature():
     speed, angle = np.hypot(u_t, u_p), np.arctan2(u_p, u_t)
     chord = 0.06 - 0.02 * s / length
     coefficients = [
-        plain_model.airfoil_coefficients(ac.airfoils["smooth"], re, alpha)
+        plain_model.airfoil_coefficients(ac.airfoils["smooth"], re, alpha, "linear")
         for re, alpha in zip(speed * chord / 1.46e-5, theta0 + 0.08 - 0.1 * s / length - angle, strict=True)
     ]
     cl, cd = np.transpose(coefficients)
@@ -518,7 +518,7 @@ def test_swashplate_signs():
                 pitch = 0.1 - 0.02 * rotor.rotation * np.cos(swing) - 0.03 * np.sin(swing) - 0.02 + 0.012
                 speed = blade.velocity(s, CALM) @ blade.t
                 reynolds = speed * rotor.chord_root / ac.environment.kinematic_viscosity
-                cl, cd = plain_model.airfoil_coefficients(ac.airfoils["smooth"], reynolds, pitch)
+                cl, cd = plain_model.airfoil_coefficients(ac.airfoils["smooth"], reynolds, pitch, "linear")
                 assert (force @ blade.n) / -(force @ blade.t) == pytest.approx(cl / cd, rel=1e-9)
 
 

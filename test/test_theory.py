@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from sbs_sim.model import records
+
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "theory.md"
 TEXT = PAGE.read_text(encoding="utf-8")
@@ -70,7 +72,7 @@ def test_named_files_exist(path):
 
 def test_numerical_modules_are_all_there():
     """Every file of the model is named by the page, but for what holds no equation."""
-    helpers = {"__init__", "kernel", "kernel_cache", "params", "state"}
+    helpers = {"__init__", "kernel", "kernel_cache", "records", "state"}
     missing = [path.stem for path in (ROOT / "sbs_sim/model").glob("*.py") if path.name not in TEXT]
     assert set(missing) <= helpers
 
@@ -94,10 +96,9 @@ def schema_keys():
     return keys | {f"rotors.{key}" for key in schema["rotors"]["items"]["properties"]}
 
 
-def test_columns_of_the_symbols_exist():
-    tree = ast.parse((ROOT / "sbs_sim/model/params.py").read_text(encoding="utf-8"))
-    known = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    columns = {name for row in table_rows("Symbols") for name in re.findall(r"`([A-Z_0-9]+)`", row[3])}
+def test_fields_of_the_symbols_exist():
+    known = {name for fields in vars(records).values() if isinstance(fields, dict) for name in fields}
+    columns = {name for row in table_rows("Symbols") for name in re.findall(r"`(\w+)`", row[3])}
     assert columns
     assert columns <= known
 

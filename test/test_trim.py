@@ -11,7 +11,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
 from sbs_sim.errors import TrimError
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.simulation import trimmed_state
 
@@ -450,8 +450,8 @@ def test_loads_of_a_trim_are_those_of_its_state(sbs):
     """Thrust, torque and power are averages over the azimuth at the trimmed state."""
     point = trim(sbs, 12.0)
     loads = Model(sbs).averaged(trimmed_state(sbs, point), point.swashplate)[1]
-    np.testing.assert_allclose(point.thrust, loads[:, P.THRUST], rtol=1e-9)
-    np.testing.assert_allclose(point.torque, loads[:, P.TORQUE], rtol=1e-9)
+    np.testing.assert_allclose(point.thrust, loads[:, R.THRUST], rtol=1e-9)
+    np.testing.assert_allclose(point.torque, loads[:, R.TORQUE], rtol=1e-9)
 
 
 def test_a_small_rotor_that_points_sideways_does_not_mislead_the_trim(sbs, hover):

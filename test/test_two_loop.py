@@ -16,7 +16,7 @@ from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
 from sbs_sim.analysis.two_loop import solve_by_two_loops
 from sbs_sim.errors import TrimError
 from sbs_sim.model import state as S
-from sbs_sim.model.dynamics import steady_balance
+from sbs_sim.model.steady import steady_balance
 from sbs_sim.simulation import trimmed_state
 
 FIDELITIES = [(True, True), (True, False), (False, True), (False, False)]
@@ -29,10 +29,10 @@ MESSAGE = re.compile(
 
 def balance(model, x, swash, psi, wind=CALM):
     """Return the rates of steady flight at an azimuth, shape (size,), and the imbalance, shape (6,)."""
-    rates, imbalance = np.empty(model.layout.size), np.empty(6)
-    arguments = (np.array(value, dtype=float) for value in (x, swash, psi, wind))
-    steady_balance(model.params, *arguments, model.work, rates, imbalance)
-    return rates, imbalance
+    engine = model.engine
+    rates, imbalance = engine.memory(model.layout.size), engine.memory(6)
+    steady_balance(engine.model, *map(model.lanes, (x, swash, psi, wind)), engine.work, rates, imbalance)
+    return rates[:, 0], imbalance[:, 0]
 
 
 def mean_balance(model, point, count=12):
@@ -133,10 +133,11 @@ def test_blades_of_a_hover_are_the_held_ones(fixtures, request):
     model, x = Model(aircraft), trimmed_state(aircraft, point)
     for psi in (0.0, 0.4, 1.7):
         model.derivative(x, point.swashplate, [psi, psi])
-        expected, blades = model.work.loads.copy(), model.work.blade.copy()
+        expected, blades = model.loads.copy(), model.engine.work.terms.copy()
         balance(model, x, point.swashplate, [psi, psi])
-        np.testing.assert_allclose(model.work.loads, expected, atol=1e-7)
-        np.testing.assert_allclose(model.work.blade, blades, atol=1e-6)
+        np.testing.assert_allclose(model.loads, expected, atol=1e-7)
+        for name in ("flap_acceleration", "lag_acceleration", "flap_moment", "lag_moment", "force", "moment"):
+            np.testing.assert_allclose(model.engine.work.terms[name], blades[name], atol=1e-6, err_msg=name)
 
 
 @pytest.mark.parametrize(("lead_lag", "cyclic_inflow"), FIDELITIES)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers import wind_velocity
 from scipy.linalg import expm
 from scipy.signal import welch
 
@@ -13,14 +14,8 @@ from sbs_sim import Simulation
 from sbs_sim.errors import SimulationError
 from sbs_sim.model.frames import rotation_matrix
 from sbs_sim.model.state import VELOCITY
-from sbs_sim.model.wind import TURBULENCE_FROM, TURBULENCE_TO, WIND_SIZE, Wind, WindField, _noise_of_step, wind_at
+from sbs_sim.model.wind import TURBULENCE_FROM, TURBULENCE_TO, WIND_SIZE, Wind, WindField, _noise_of_step
 from sbs_sim.simulation import simulate, trimmed_state
-
-
-def air_at(field_array, time, fraction=0.0):
-    out = np.empty(3)
-    wind_at(field_array, time, fraction, out)
-    return out
 
 
 def turbulence(wind, tick, count):
@@ -35,7 +30,7 @@ def turbulence(wind, tick, count):
 def test_no_wind_by_default():
     array = WindField(Wind(), 0.0, 0.01).next_tick()
     assert array.shape == (WIND_SIZE,)
-    np.testing.assert_array_equal(air_at(array, 0.0), 0.0)
+    np.testing.assert_array_equal(wind_velocity(array, 0.0), 0.0)
 
 
 def test_the_gust_has_the_shape_the_peak_and_the_integral_of_one_minus_cosine():
@@ -43,11 +38,11 @@ def test_the_gust_has_the_shape_the_peak_and_the_integral_of_one_minus_cosine():
     array = WindField(wind, 10.0, 0.01).next_tick()
     steady, peak = np.array(wind.velocity), np.array(wind.gust)
     for before_or_after in (0.0, 11.999999, 15.000001, 1000.0):
-        np.testing.assert_array_equal(air_at(array, before_or_after), steady)
+        np.testing.assert_array_equal(wind_velocity(array, before_or_after), steady)
     for share, part in ((0.0, 0.0), (1 / 6, 0.25), (0.25, 0.5), (0.5, 1.0), (0.75, 0.5), (1.0, 0.0)):
-        np.testing.assert_allclose(air_at(array, 12 + 3 * share), steady + part * peak, atol=1e-12)
+        np.testing.assert_allclose(wind_velocity(array, 12 + 3 * share), steady + part * peak, atol=1e-12)
     times = np.linspace(11.0, 16.0, 5001)
-    speeds = np.array([air_at(array, time) for time in times]) - steady
+    speeds = np.array([wind_velocity(array, time) for time in times]) - steady
     # the trapezoidal rule is exact for whole periods
     np.testing.assert_allclose(speeds.sum(axis=0) * 0.001, peak * 3.0 / 2, rtol=1e-9)
     assert np.abs(speeds).max() == pytest.approx(8.0)
@@ -59,7 +54,7 @@ def test_the_gust_has_the_shape_the_peak_and_the_integral_of_one_minus_cosine():
 def test_a_gust_without_a_delay_begins_at_once():
     array = WindField(Wind(gust=(8.0, 0.0, 0.0), gust_duration=2.0), 10.0, 0.01).next_tick()
     np.testing.assert_allclose(
-        [air_at(array, 10.0 + t)[0] for t in (0.0, 0.5, 1.0, 2.0)], [0.0, 4.0, 8.0, 0.0], atol=1e-12
+        [wind_velocity(array, 10.0 + t)[0] for t in (0.0, 0.5, 1.0, 2.0)], [0.0, 4.0, 8.0, 0.0], atol=1e-12
     )
 
 
@@ -231,10 +226,10 @@ def test_turbulence_is_continuous_and_linear_within_a_tick():
     end = None
     for _ in range(20):
         array = field.next_tick()
-        start, finish = air_at(array, 0.0, 0.0), air_at(array, 0.0, 1.0)
+        start, finish = wind_velocity(array, 0.0, 0.0), wind_velocity(array, 0.0, 1.0)
         if end is not None:
             np.testing.assert_allclose(start, end, rtol=1e-13)
-        np.testing.assert_allclose(air_at(array, 0.0, 0.25), 0.75 * start + 0.25 * finish, rtol=1e-12)
+        np.testing.assert_allclose(wind_velocity(array, 0.0, 0.25), 0.75 * start + 0.25 * finish, rtol=1e-12)
         np.testing.assert_array_equal(start, array[TURBULENCE_FROM : TURBULENCE_FROM + 3])
         end = finish
 

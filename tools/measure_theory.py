@@ -23,7 +23,6 @@ from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
 from sbs_sim.analysis.two_loop import _TwoLoops
 from sbs_sim.errors import TrimError
-from sbs_sim.model.trigonometry import arctangent2
 
 FORWARD, FASTEST, STEP = 15.0, 30.0, 0.5  # m/s
 ONLY_FLAP = {"lead_lag": False, "cyclic_inflow": False}
@@ -199,14 +198,6 @@ def two_loops() -> None:
             print(f"  {'':{len(name) - 2}s}  Newton: {right.iterations} iterations, residual {right.residual:.1e}")
 
 
-def arctangent() -> None:
-    """Error of the arctangent of the section loads."""
-    rng = np.random.default_rng(1)
-    points = np.concatenate([rng.normal(size=(20000, 2)), rng.normal(size=(20000, 2)) * [1.0, 1e-6]])
-    errors = [abs(arctangent2(y, x) - math.atan2(y, x)) for y, x in points]
-    print(f"  {max(errors):.1e}")
-
-
 def outer_gains() -> None:
     """Gains of the outer loop about Newton's solution, for symmetric and antisymmetric departures."""
     aircraft = undamped_sbs()
@@ -273,7 +264,6 @@ def constructions() -> None:
 
 BODY_MODES = ("short period", "phugoid", "heave subsidence", "roll", "Dutch roll", "spiral")
 METHODS: dict[str, Callable[[], None]] = {
-    "arctangent": arctangent,
     "stepping": stepping,
     "azimuth count": azimuths,
     "difference steps": differences,

@@ -23,11 +23,13 @@ from sbs_sim.analysis.control_effects import ControlEffect, control_effects
 from sbs_sim.analysis.modes import Mode, modes
 from sbs_sim.analysis.trim import Guess, TrimPoint, trim
 from sbs_sim.content import ByContent
+from sbs_sim.engine import Engine
 from sbs_sim.errors import LinearizationError
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
+from sbs_sim.model.solve import solve
 
 Array = NDArray[np.float64]
 
@@ -43,9 +45,9 @@ BODY_STEPS = {
 FORCES = {"u": "X", "v": "Y", "w": "Z"}  # Padfield's names by the equation
 MOMENTS = {"p": "L'", "q": "M", "r": "N'"}
 MOTIONS = ("u", "w", "q", "v", "p", "r")
-LOADS = {P.THRUST: ("thrust", "N"), P.TORQUE: ("torque", "N m")}
-LOADS |= {P.FORCE + i: (f"hub_force_{axis}", "N") for i, axis in enumerate("xyz")}
-LOADS |= {P.MOMENT + i: (f"hub_moment_{axis}", "N m") for i, axis in enumerate("xyz")}
+LOADS = {R.THRUST: ("thrust", "N"), R.TORQUE: ("torque", "N m")}
+LOADS |= {R.FORCE + i: (f"hub_force_{axis}", "N") for i, axis in enumerate("xyz")}
+LOADS |= {R.MOMENT + i: (f"hub_moment_{axis}", "N m") for i, axis in enumerate("xyz")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,7 +344,7 @@ def settle(a: Array, b: Array, slow: Sequence[int]) -> tuple[Array, Array, Array
     """
     fast = [i for i in range(len(a)) if i not in slow]
     try:
-        settled = -np.asarray(np.linalg.solve(a[np.ix_(fast, fast)], np.hstack([a[fast][:, slow], b[fast]])), float)
+        settled = -solve(a[np.ix_(fast, fast)], np.hstack([a[fast][:, slow], b[fast]]))
     except np.linalg.LinAlgError:
         raise LinearizationError("the states that are not kept do not settle: their matrix is singular") from None
     by_state, by_control = settled[:, : len(slow)], settled[:, len(slow) :]
@@ -393,17 +395,26 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
     ndarray, shape (n_azimuths, linear_size + 3 + 8 n_rotors, linear_size + 4)
         Columns of states that the fidelity leaves out are zero.
     """
-    params = aircraft.params(point.lead_lag, point.cyclic_inflow)
-    rotors = len(aircraft.rotors)
+    engine = Engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
     inputs = np.concatenate([point.state, point.controls])
-    outputs = len(point.state) + SPECIFIC_FORCE_SIZE + rotors * P.LOAD_SIZE
+    outputs = len(point.state) + SPECIFIC_FORCE_SIZE + R.LOAD_SIZE * engine.rotors
     used = np.zeros(len(inputs), dtype=bool)
     used[used_states(point)] = used[len(point.state) :] = True
     result = np.zeros((len(psi), len(inputs), outputs))
-    mixing = np.stack([rotor.mixing for rotor in aircraft.rotors])
-    swash = np.zeros((rotors, len(S.SWASHPLATE_NAMES)))
-    work = P.make_work(params)
-    jacobian(params, inputs, mixing, np.where(used, steps, 0.0), psi, np.zeros(3), work, swash, result)
+    mixing = np.concatenate([rotor.mixing for rotor in aircraft.rotors])
+    jacobian(
+        *(
+            engine.code.derivative,
+            engine.model,
+            inputs,
+            mixing,
+            np.where(used, steps, 0.0),
+            psi,
+            engine.work,
+            engine.tick,
+        ),
+        *(engine.memory(len(inputs)), np.zeros((engine.n + 1, outputs)), result),
+    )
     return result.transpose(0, 2, 1)
 
 
@@ -453,11 +464,11 @@ def _outputs(aircraft: Aircraft, point: TrimPoint, mean: Array) -> tuple[Array, 
     rows = [*np.eye(inputs)[: S.LINEAR_BODY_SIZE], _climb_row(point, inputs), *mean[size : size + SPECIFIC_FORCE_SIZE]]
     names = [*S.LINEAR_BODY_NAMES, "climb_rate", *(f"specific_force_{axis}" for axis in "xyz")]
     units = [*S.LINEAR_BODY_UNITS, "m/s", *("m/s^2",) * SPECIFIC_FORCE_SIZE]
-    loads = mean[size + SPECIFIC_FORCE_SIZE :].reshape(len(aircraft.rotors), P.LOAD_SIZE, inputs)
+    loads = mean[size + SPECIFIC_FORCE_SIZE :].reshape(len(aircraft.rotors), R.LOAD_SIZE, inputs)
     for j, rotor in enumerate(aircraft.rotors):
-        rows += [*loads[j], rotor.speed * loads[j, P.TORQUE]]
-        names += [f"{LOADS[i][0]}({j + 1})" for i in range(P.LOAD_SIZE)] + [f"power({j + 1})"]
-        units += [LOADS[i][1] for i in range(P.LOAD_SIZE)] + ["W"]
+        rows += [*loads[j], rotor.speed * loads[j, R.TORQUE]]
+        names += [f"{LOADS[i][0]}({j + 1})" for i in range(R.LOAD_SIZE)] + [f"power({j + 1})"]
+        units += [LOADS[i][1] for i in range(R.LOAD_SIZE)] + ["W"]
     return np.stack(rows), tuple(names), tuple(units)
 
 
@@ -504,7 +515,7 @@ def kinematics(state: Array, inertia: Array, gravity: float) -> Array:
     a[axis, S.LINEAR_THETA] = -g * ct, -g * sp * st, -g * cp * st
     a[axis, S.LINEAR_PHI] = 0.0, g * cp * ct, -g * sp * ct
     gyroscopic = _cross(rates) @ inertia - _cross(inertia @ rates)
-    a[np.ix_(turn, turn)] = -np.linalg.solve(inertia, gyroscopic)
+    a[np.ix_(turn, turn)] = -solve(inertia, gyroscopic)
     heading = q * sp + r * cp  # psi' cos theta
     a[S.LINEAR_THETA, [S.LINEAR_Q, S.LINEAR_R]] = cp, -sp
     a[S.LINEAR_THETA, S.LINEAR_PHI] = -heading

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sbs_sim import interruption
 from sbs_sim.content import ByContent
+from sbs_sim.model.solve import smallest, solve
 
 Array = NDArray[np.float64]
 Equations = Callable[[Array], Array]
@@ -84,12 +85,12 @@ def newton(equations: Equations, start: Array, jacobian: Equations | None = None
 def _step(matrix: Array, residual: Array) -> Array:
     """Newton's step; the smallest of all where the equations leave a direction open, which then moves nothing."""
     try:
-        step = np.asarray(np.linalg.solve(matrix, residual), dtype=np.float64)
+        step = solve(matrix, residual)
         if np.abs(step).max() < LARGEST_UNKNOWN or not np.isfinite(matrix).all():
             return step
     except np.linalg.LinAlgError:
         pass
-    return np.asarray(np.linalg.lstsq(matrix, residual, rcond=OPEN)[0], dtype=np.float64)
+    return smallest(matrix, residual, OPEN)
 
 
 def _jacobian(equations: Equations, values: Array) -> Array:

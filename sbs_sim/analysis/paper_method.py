@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft, Rotor
+from sbs_sim.aircraft_model import second_moment
 from sbs_sim.analysis.linearize import kinematics, settle, used_states
 from sbs_sim.analysis.trim import TrimPoint
-from sbs_sim.model import params as P
+from sbs_sim.engine import Engine
 from sbs_sim.model import state as S
-from sbs_sim.model.average import averaged_derivative, azimuths
-from sbs_sim.model.frames import rotation_matrix
+from sbs_sim.model.average import azimuths
+from sbs_sim.model.frames import hub_axes, rotation_matrix
 from sbs_sim.model.inflow import inflow_matrix
 from sbs_sim.model.multiblade import blade_matrix
 
@@ -86,11 +87,8 @@ class _TaylorTerms:
         self.aircraft, self.point, self.layout = aircraft, point, aircraft.layout
         self.trim = np.concatenate([point.state, point.controls])
         self.inflow_start = S.LINEAR_BODY_SIZE + 4 * self.layout.blade_count
-        self._params = aircraft.params(point.lead_lag, point.cyclic_inflow)
-        self._work = P.make_work(self._params)
+        self._engine = Engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
         self._psi = azimuths(aircraft.layout.blades, point.azimuth_count)
-        self._dx = np.zeros(self.layout.size)
-        self._loads = np.zeros((len(aircraft.rotors), P.LOAD_SIZE))
         self._constant = [self._turning(rotor) for rotor in aircraft.rotors]
         self._at_trim = [self._coupling(j, point.state[self._places(j)[0]]) for j in range(len(aircraft.rotors))]
 
@@ -138,10 +136,9 @@ class _TaylorTerms:
         """Mean rates of the linear state; those of the attitude are left out, as they hold no load."""
         x = self.layout.from_linear(inputs[: self.layout.linear_size])
         swash = self.aircraft.mix(inputs[self.layout.linear_size :])
-        count = self.point.azimuth_count
-        averaged_derivative(self._params, x, swash, count, np.zeros(3), self._work, self._dx, self._loads)
-        u, v, w, p, q, r = self._dx[S.VELOCITY : S.BODY_SIZE]
-        return np.concatenate([[u, w, q, 0.0, v, p, 0.0, r], self._dx[S.BODY_SIZE :]])
+        rates, _ = self._engine.average(x, swash, self._psi)
+        u, v, w, p, q, r = rates[S.VELOCITY : S.BODY_SIZE]
+        return np.concatenate([[u, w, q, 0.0, v, p, 0.0, r], rates[S.BODY_SIZE : len(x)]])
 
     def _expand_body(self, state: Array, rates: Array, result: Array) -> None:
         """Newton-Euler, eq. [16]: F/m = U' + om x U - g, I^-1 M = om' + I^-1 (om x I om)."""
@@ -165,19 +162,19 @@ class _TaylorTerms:
         D^beta = -2 Omega (A1 cos beta + e_F S1) sin beta = -D^xi (theory.md section 3). The paper's reading has A1
         alone in it, which is what its Table 5 shows.
         """
-        rotor, row = self.aircraft.rotors[j], self._params.rotor[j]
+        rotor = self.aircraft.rotors[j]
+        a1, offset, first = second_moment(self.aircraft, rotor), rotor.flap_hinge_offset, rotor.first_moment
         if not self.point.lead_lag:
             none = np.zeros((rotor.blades, rotor.blades))
             return none, none, none, none
-        offset = 0.0 if self.aircraft.options.hub_moment == "paper" else row[P.FLAP_HINGE] * row[P.S1]
+        beyond = 0.0 if self.aircraft.options.hub_moment == "paper" else offset * first
         to_blades = blade_matrix(rotor.blades, self._psi[:, j])
         turned = rotor.speed * blade_matrix(rotor.blades, self._psi[:, j], 1)
         beta = to_blades @ flap
-        d = -2 * rotor.speed * (row[P.A1] * np.cos(beta) + offset) * np.sin(beta)
-        a2 = row[P.BLADE_MASS] * row[P.FLAP_HINGE] ** 2 + 2 * row[P.FLAP_HINGE] * row[P.S1] * np.cos(beta)
-        a2 += row[P.A1] * np.cos(beta) ** 2
+        d = -2 * rotor.speed * (a1 * np.cos(beta) + beyond) * np.sin(beta)
+        a2 = rotor.blade_mass * offset**2 + 2 * offset * first * np.cos(beta) + a1 * np.cos(beta) ** 2
         back = np.linalg.inv(to_blades)
-        of_flap, of_lag = back * (-d / row[P.A1])[:, None, :], back * (d / a2)[:, None, :]
+        of_flap, of_lag = back * (-d / a1)[:, None, :], back * (d / a2)[:, None, :]
         parts = (of_flap @ turned, of_flap @ to_blades, of_lag @ turned, of_lag @ to_blades)
         c0b, c1b, c0x, c1x = (part.mean(axis=0) for part in parts)
         return c0b, c1b, c0x, c1x
@@ -222,20 +219,12 @@ class _TaylorTerms:
         """C^lambda of all rotors in still air, block diagonal as eq. [33] writes it; shape (3 n_rotors, 3 n_rotors)."""
         result = np.zeros((3 * len(self.aircraft.rotors),) * 2)
         velocity, om = state[AXES[0]], state[AXES[1]]
-        cyclic = self._params.switches[P.CYCLIC_INFLOW]
+        rotors, cyclic = self.aircraft.model().rotors, int(self.point.cyclic_inflow)
         for j, rotor in enumerate(self.aircraft.rotors):
-            flow = self._params.axes[j].T @ (velocity + np.cross(om, rotor.hub)) / (rotor.speed * rotor.radius)
-            place = self._inflow_place(j)
-            own = np.zeros((3, 3))
-            inflow_matrix(
-                state[place.start],
-                *flow,
-                self._params.rotor[j, P.SENSE],
-                rotor.duct_expansion,
-                rotor.speed,
-                cyclic,
-                own,
-            )
+            at_hub = hub_axes(rotor.shaft_direction).T @ (velocity + np.cross(om, rotor.hub))
+            flow, place = at_hub / (rotor.speed * rotor.radius), self._inflow_place(j)
+            own = np.zeros((3, 3, 1))
+            inflow_matrix(rotors, j, state[[place.start], np.newaxis], flow[:, np.newaxis], cyclic, own)
             within = slice(3 * j, 3 * j + 3)
-            result[within, within] = own
+            result[within, within] = own[..., 0]
         return result

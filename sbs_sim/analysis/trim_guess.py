@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft import LEAST_DENSITY, Rotor
+from sbs_sim.aircraft import Aircraft, Rotor
+from sbs_sim.aircraft_model import LEAST_DENSITY, second_moment
 from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
 from sbs_sim.content import ByContent
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.airfoil import AirfoilTable
 
@@ -26,6 +27,7 @@ LEAST_SLOPE = 1.0  # 1/rad, of a lift curve; that of thin airfoils is 2 pi
 LEAST_LOADING = 0.01  # of the mean disc loading: a rotor with less has the flow of this, for without any Newton is lost
 MOST_STEPS, MOST_MOMENTUM_STEPS = 12, 20
 TOLERANCE = 1e-3  # of the weight, and rad: what follows is Newton's
+DIGITS = 9  # decimal places of a guess
 LARGEST_STEP = 0.15  # rad, of a control, but for the first step, which goes all the way to the wanted thrust
 THRUST_STEP = 4.0  # a rotor that carries gets no more than this times its thrust in a step, and no less than its part
 WEAKEST = 1e-3  # of the strongest effect of the controls: directions with less are left to Newton
@@ -85,24 +87,25 @@ class MomentumRotor:
         disc, and these tilts.
     """
 
-    def __init__(self, rotor: Rotor, params: P.Params, j: int, table: AirfoilTable) -> None:
+    def __init__(self, aircraft: Aircraft, model: R.Model, j: int) -> None:
+        rotor = aircraft.rotors[j]
         self.speed, self.sense, self.mixing = rotor.speed, rotor.rotation, rotor.mixing
         self.tip_speed, self.area = rotor.speed * rotor.radius, math.pi * rotor.radius**2
-        self._axes = params.axes[j]
+        self._axes = model.rotors["axes"][j, :, :, 0]
         self.upward = max(0.0, float(self._axes[2, 2]))
-        self._density = max(float(params.air[P.DENSITY]), LEAST_DENSITY)
+        self._density = max(aircraft.environment.air_density, LEAST_DENSITY)
         # thrust is this times the induced velocity times the flow through the disc, eq. (6.1)
         self._mass_flow = self._density * self.area / (2 * rotor.duct_expansion**2)
-        self._sum_sections(rotor, params, j, table)
-        self._hold_blades(rotor, float(params.rotor[j, P.A1]), float(params.air[P.GRAVITY]))
+        chord = 0.5 * (rotor.chord_root + rotor.chord_tip)
+        reynolds = 0.75 * self.tip_speed * chord * float(model.air["inverse_viscosity"][0, 0])
+        curve = _lift_curve(aircraft.tables[j], reynolds)
+        self._sum_sections(rotor, rotor.elements(aircraft.options.elements), *curve)
+        self._hold_blades(rotor, second_moment(aircraft, rotor), aircraft.environment.gravity)
         self.wrench = self._make_wrench(rotor.hub)
 
-    def _sum_sections(self, rotor: Rotor, params: P.Params, j: int, table: AirfoilTable) -> None:
+    def _sum_sections(self, rotor: Rotor, elements: Array, slope: float, at_zero: float, drag: float) -> None:
         """Sums over the sections of all blades of the slope of lift with powers of the radius, twist and lever."""
-        chunks = params.element[j].reshape(-1, P.ELEMENT_SIZE // P.CHUNK, P.CHUNK)
-        span, _, half_area, lifting, twist = np.concatenate(list(chunks), axis=1)
-        reynolds = 0.75 * self.tip_speed * 0.5 * (rotor.chord_root + rotor.chord_tip) * params.air[P.INVERSE_VISCOSITY]
-        slope, at_zero, drag = _lift_curve(table, float(reynolds))
+        span, _, half_area, lifting, twist = elements
         radius, weight = rotor.hinge_offset + span, (self._density * rotor.blades) * half_area
         powers, of_twist = np.empty((3, span.size)), np.ones((span.size, 2))
         np.multiply(weight, slope * lifting, out=powers[0])
@@ -249,11 +252,8 @@ class MomentumTheory:
 
     def __init__(self, problem: TrimProblem) -> None:
         self._problem, self.aircraft = problem, problem.aircraft
-        airfoils = self.aircraft.airfoils
-        self.rotors = [
-            MomentumRotor(rotor, problem.params, j, airfoils[rotor.airfoil])
-            for j, rotor in enumerate(self.aircraft.rotors)
-        ]
+        model = problem.engine.model
+        self.rotors = [MomentumRotor(self.aircraft, model, j) for j in range(len(self.aircraft.rotors))]
 
     def guess(self, condition: TrimCondition, share: float = 1.0, controls: Array | None = None) -> Array:
         """Unknowns of a trim, shape (n,); the parameters are those of `balance`."""
@@ -266,7 +266,8 @@ class MomentumTheory:
             x[layout.flap(j)][:3] = [_clipped(angle, LARGEST_FLAP) for angle in rotor.flap]
             x[layout.lag(j).start] = _clipped(rotor.lag, LARGEST_LAG)
             x[layout.inflow(j).start] = rotor.inflow
-        return self._problem.unknowns(found.pitch, found.roll, found.controls, x)
+        # rounded, so that no last bit of the libraries' sines and sums is in where a trim begins
+        return np.round(self._problem.unknowns(found.pitch, found.roll, found.controls, x), DIGITS)
 
     def balance(self, condition: TrimCondition, share: float = 1.0, controls: Array | None = None) -> Balance:
         """Balance the aircraft.
@@ -305,7 +306,7 @@ class MomentumTheory:
 
         The thrusts are those of the problem's last residual.
         """
-        layout, thrusts = self._problem.layout, self._problem.loads[:, P.THRUST].tolist()
+        layout, thrusts = self._problem.layout, self._problem.loads[:, R.THRUST].tolist()
         x, swash = self._problem.state(condition, unknowns)
         velocity, _ = condition.motion(unknowns[0], unknowns[1])
         found = np.empty(len(self.rotors))

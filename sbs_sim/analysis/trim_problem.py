@@ -17,13 +17,15 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.export import trim_to_dict
 from sbs_sim.content import ByContent
+from sbs_sim.engine import Engine
 from sbs_sim.errors import TrimError
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
-from sbs_sim.model.average import averaged_derivative, azimuths
+from sbs_sim.model.average import azimuths
+from sbs_sim.model.balance import trim_residuals
 from sbs_sim.model.dynamics import derivative
+from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
-from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
 from sbs_sim.validity import warnings
 
@@ -49,7 +51,6 @@ BODY_BALANCES = (
     "pitching moment",
     "yawing moment",
 )
-MOTION = [S.LINEAR_U, S.LINEAR_V, S.LINEAR_W, S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]
 
 
 @dataclass(frozen=True)
@@ -104,10 +105,14 @@ class TrimCondition:
 
     def motion(self, pitch: float, roll: float) -> tuple[Array, Array]:
         """Velocity [m/s] and angular velocity [rad/s] in body axes at an attitude [rad], each shape (3,)."""
-        along, across = math.cos(self.sideslip), math.sin(self.sideslip)
-        heading_axes = np.array([self.airspeed * along, self.airspeed * across, -self.climb_rate])
-        to_body = rotation_matrix(euler_to_quaternion(0.0, pitch, roll)).T
-        return to_body @ heading_axes, to_body @ np.array([0.0, 0.0, self.turn_rate])
+        forward, right, down, turn = self.along_heading().tolist()
+        rows = rotation_matrix(euler_to_quaternion(0.0, pitch, roll))
+        return rows[0] * forward + rows[1] * right + rows[2] * down, rows[2] * turn
+
+    def along_heading(self) -> Array:
+        """Velocity forward, right and down in axes of the heading [m/s], and its rate [rad/s], shape (4,)."""
+        along, across = cosine_and_sine(self.sideslip)
+        return np.array([self.airspeed * along, self.airspeed * across, -self.climb_rate, self.turn_rate])
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +240,7 @@ class TrimProblem:
         What each is divided by: gravity [m/s^2], Omega^2 [1/s^2], Omega [1/s].
     coordinates, inflow : ndarray of int64
         Places of flap and lag, and of inflow, among the unknowns and among the equations.
-    loads : ndarray, shape (n_rotors, params.LOAD_SIZE)
+    loads : ndarray, shape (n_rotors, records.LOAD_SIZE)
         Mean loads of the last residual.
     """
 
@@ -243,20 +248,16 @@ class TrimProblem:
         self.aircraft = aircraft
         self.lead_lag, self.cyclic_inflow, self.azimuth_count = lead_lag, cyclic_inflow, azimuth_count
         self.layout = aircraft.layout
-        self.params = aircraft.params(lead_lag, cyclic_inflow)
-        self.work = P.make_work(self.params)
-        self._mixing = np.stack([rotor.mixing for rotor in aircraft.rotors])
-        self._in_use = 1.0 * self._mixing.any(axis=(0, 1))  # controls that move a swashplate
+        self.engine = Engine(aircraft.arranged(lead_lag, cyclic_inflow, "points"))
+        self._mixing = np.concatenate([rotor.mixing for rotor in aircraft.rotors])
+        self._psi = azimuths(self.layout.blades, azimuth_count)
         self._places, equations = self._rotor_unknowns()
         self.equations = np.concatenate([np.arange(S.VELOCITY, S.BODY_SIZE), equations])
         self.scales = self._equation_scales()
-        linear = self.equations - S.BODY_SIZE + S.LINEAR_BODY_SIZE
-        self._linear_equations = np.concatenate([MOTION, linear[len(MOTION) :]])
         is_inflow = self._places >= self.layout.inflow(0).start
         self.coordinates = BODY_UNKNOWNS + np.flatnonzero(~is_inflow)
         self.inflow = BODY_UNKNOWNS + np.flatnonzero(is_inflow)
-        self._dx = np.zeros(self.layout.size)
-        self.loads = np.zeros((len(aircraft.rotors), P.LOAD_SIZE))
+        self.loads = np.zeros((len(aircraft.rotors), R.LOAD_SIZE))
 
     def _rotor_unknowns(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Places of the unknown rotor states in the simulation state, and of their equations in its rate."""
@@ -285,9 +286,10 @@ class TrimProblem:
     def lighter(self, share: float) -> "TrimProblem":
         """The same with a share of gravity and of the fuselage's drag; the scales stay."""
         problem = copy.copy(self)
-        air = self.params.air.copy()
-        air[[P.GRAVITY, P.PLATE_X, P.PLATE_Y, P.PLATE_Z]] *= share
-        problem.params = self.params._replace(air=air)
+        air = self.engine.model.air.copy()
+        air["gravity"] *= share
+        air["plate_areas"] *= share
+        problem.engine = Engine(self.engine.model._replace(air=air))
         return problem
 
     def unknowns(self, pitch: float, roll: float, controls: Array, x: Array) -> Array:
@@ -301,50 +303,36 @@ class TrimProblem:
         x[S.ATTITUDE : S.ATTITUDE + 4] = euler_to_quaternion(0.0, pitch, roll)
         x[S.VELOCITY : S.RATES], x[S.RATES : S.BODY_SIZE] = condition.motion(pitch, roll)
         x[self._places] = unknowns[BODY_UNKNOWNS:]
-        return x, self._mixing @ unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS]
+        return x, self.aircraft.mix(unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS])
 
     def residual(self, condition: TrimCondition, unknowns: Array) -> Array:
         """Scaled residuals of the equations; the mean loads are left in `loads`."""
-        x, swash = self.state(condition, unknowns)
-        averaged_derivative(self.params, x, swash, self.azimuth_count, np.zeros(3), self.work, self._dx, self.loads)
-        return self._dx[self.equations] / self.scales
+        residuals, loads = self._residuals(condition, unknowns[np.newaxis], self._psi)
+        self.loads = loads.reshape(self.loads.shape)
+        return residuals[0]
 
     def jacobian(self, condition: TrimCondition, unknowns: Array) -> Array:
         """Derivative of `residual` by the unknowns, shape (n, n), averaged over a few azimuths.
 
         Central differences in one call of compiled code, so that trims in several threads hardly wait for each other.
-        Pitch and roll act by the attitude, and by the axes in which the condition's motion is taken.
         """
-        x, _ = self.state(condition, unknowns)
-        size = self.layout.linear_size
-        inputs = np.concatenate([self.layout.to_linear(x), unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS]])
-        rotor = self._places - S.BODY_SIZE + S.LINEAR_BODY_SIZE
-        steps = np.zeros(len(inputs))  # the rates of flap and lag are no unknowns
-        steps[: S.LINEAR_BODY_SIZE] = BODY_STEP
-        steps[rotor] = steps[size:] = ROTOR_STEP
-        steps[[S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]] *= condition.turn_rate != 0.0
+        steps = np.full(len(unknowns), ROTOR_STEP)
+        steps[:ATTITUDE_UNKNOWNS] = BODY_STEP
         psi = azimuths(self.layout.blades, min(self.azimuth_count, JACOBIAN_AZIMUTHS))
-        outputs = size + SPECIFIC_FORCE_SIZE + self.loads.size
-        each = np.zeros((len(psi), len(inputs), outputs))
-        swash = np.zeros((psi.shape[1], len(S.SWASHPLATE_NAMES)))
-        jacobian(self.params, inputs, self._mixing, steps, psi, np.zeros(3), self.work, swash, each)
-        slopes = each.mean(axis=0).T[self._linear_equations]
-        columns = [
-            slopes[:, angle] + slopes[:, MOTION] @ self._motion_slope(condition, unknowns, i)
-            for i, angle in enumerate((S.LINEAR_THETA, S.LINEAR_PHI))
-        ]
-        controls = slopes[:, size:] * self._in_use
-        return np.column_stack([*columns, controls, slopes[:, rotor]]) / self.scales[:, None]
+        sides = np.concatenate([unknowns + np.diag(steps), unknowns - np.diag(steps)])
+        forward, backward = np.split(self._residuals(condition, sides, psi)[0], 2)
+        return ((forward - backward) / (2.0 * steps[:, np.newaxis])).T
 
-    def _motion_slope(self, condition: TrimCondition, unknowns: Array, i: int) -> Array:
-        """Derivative of u, v, w, p, q, r by pitch (i = 0) or roll (1)."""
-        if not condition.is_motion:
-            return np.zeros(len(MOTION))
-        forward, backward = unknowns[:ATTITUDE_UNKNOWNS].copy(), unknowns[:ATTITUDE_UNKNOWNS].copy()
-        forward[i] += BODY_STEP
-        backward[i] -= BODY_STEP
-        change = np.subtract(condition.motion(*forward), condition.motion(*backward))
-        return change.ravel() / (2 * BODY_STEP)
+    def _residuals(self, condition: TrimCondition, unknowns: Array, psi: Array) -> tuple[Array, Array]:
+        """Scaled residuals (m, n) and mean loads (m, 8 n_rotors) of vectors of unknowns (m, n)."""
+        engine = self.engine
+        residuals, loads = np.empty((len(unknowns), len(self.equations))), np.empty((len(unknowns), self.loads.size))
+        trim_residuals(
+            *(engine.code.derivative, engine.model, unknowns, condition.along_heading(), self._places, self.equations),
+            *(self.scales, self._mixing, psi, engine.work, engine.tick, engine.memory(unknowns.shape[1])),
+            *(residuals, loads),
+        )
+        return residuals, loads
 
     def worst_equation(self, residual: Array) -> str:
         """Name of the equation with the largest residual, as "d(state)/dt"."""
@@ -362,7 +350,7 @@ class TrimProblem:
     def beyond_limits(self, unknowns: Array) -> tuple[str, ...]:
         """What lies beyond its range, as "name = value deg: allowed are low to high deg"."""
         controls = unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS]
-        return _beyond_limits(self.aircraft, controls, self._mixing @ controls)
+        return _beyond_limits(self.aircraft, controls, self.aircraft.mix(controls))
 
     def point(
         self, condition: TrimCondition, unknowns: Array, method: str, iterations: int, inner_iterations: int = 0
@@ -372,7 +360,7 @@ class TrimProblem:
         x, swash = self.state(condition, unknowns)
         controls = unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS].copy()
         speeds = np.array([rotor.speed for rotor in self.aircraft.rotors])
-        torque = self.loads[:, P.TORQUE].copy()
+        torque = self.loads[:, R.TORQUE].copy()
         return TrimPoint(
             condition=condition,
             lead_lag=self.lead_lag,
@@ -382,9 +370,9 @@ class TrimProblem:
             swashplate=swash,
             pitch=float(unknowns[0]),
             roll=float(unknowns[1]),
-            state=self.layout.to_linear(x),
+            state=self._linear_state(x, unknowns),
             state_names=self.layout.linear_names,
-            thrust=self.loads[:, P.THRUST].copy(),
+            thrust=self.loads[:, R.THRUST].copy(),
             torque=torque,
             power=torque * speeds,
             residual=float(np.abs(residual).max()),
@@ -396,15 +384,22 @@ class TrimProblem:
             parameter_hash=self.aircraft.parameter_hash,
         )
 
+    def _linear_state(self, x: Array, unknowns: Array) -> Array:
+        """Linear state of a simulation state whose attitude is known."""
+        u, v, w, p, q, r = x[S.VELOCITY : S.BODY_SIZE]
+        pitch, roll = unknowns[:ATTITUDE_UNKNOWNS]
+        return np.concatenate(([u, w, q, pitch, v, p, roll, r], x[S.BODY_SIZE :]))
+
     def _warnings(self, x: Array, swash: Array) -> tuple[str, ...]:
         """Where the model does not hold, by the mean of the working states over a few azimuths."""
-        stall, count = self.aircraft.stall_table, len(self.aircraft.rotors)
-        psi = azimuths(self.layout.blades, min(self.azimuth_count, JACOBIAN_AZIMUTHS))
-        rows, slope, still_air = np.empty((len(psi), count, WORKING_SIZE)), np.zeros(self.layout.size), np.zeros(3)
-        for place, row in zip(psi, rows, strict=True):
-            derivative(self.params, x, swash, place, still_air, self.work, slope)
-            working_state(self.params, x, stall, self.work, row)
-        return tuple(warnings(self.aircraft, rows.mean(axis=0)))
+        engine, count = self.engine, min(self.azimuth_count, JACOBIAN_AZIMUTHS)
+        psi = azimuths(self.layout.blades, count)
+        states, angles = engine.lanes([x]), engine.lanes([swash.ravel()])
+        places, still_air = engine.lanes(list(psi)), engine.memory(3)
+        derivative(engine.model, states, angles, places, still_air, engine.work, engine.tick.slopes[0], False)
+        rows = engine.memory(engine.rotors, WORKING_SIZE)
+        working_state(engine.model, engine.work, rows)
+        return tuple(warnings(self.aircraft, rows[..., :count].mean(axis=-1)))
 
 
 def _beyond_limits(aircraft: Aircraft, controls: Array, swash: Array) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft import LEAST_DENSITY
+from sbs_sim.aircraft_model import LEAST_DENSITY
 from sbs_sim.analysis.newton import newton
 from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import ATTITUDE_UNKNOWNS, BODY_UNKNOWNS, TrimCondition, TrimProblem

@@ -16,7 +16,8 @@ from sbs_sim.analysis.newton import Equations, newton
 from sbs_sim.analysis.trim_problem import BODY_UNKNOWNS, TrimCondition, TrimProblem
 from sbs_sim.errors import TrimError
 from sbs_sim.model.average import azimuths
-from sbs_sim.model.dynamics import steady_balance
+from sbs_sim.model.solve import solve
+from sbs_sim.model.steady import steady_balance
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -75,8 +76,7 @@ class _TwoLoops:
         self._body = np.arange(BODY_UNKNOWNS)
         self._coordinates, self._inflow = problem.coordinates, problem.inflow
         self._azimuths = azimuths(problem.layout.blades, problem.azimuth_count)
-        self._inverse_inertia = np.linalg.inv(problem.aircraft.body.inertia)
-        self._dx, self._imbalance = np.zeros(problem.layout.size), np.zeros(6)
+        self._inverse_inertia = solve(problem.aircraft.body.inertia, np.eye(3))
 
     def run(self) -> None:
         """Iterate until the coordinates do not change any more."""
@@ -101,7 +101,7 @@ class _TwoLoops:
         for psi in self._azimuths:
 
             def at_azimuth(unknowns: Array, psi: Array = psi) -> Array:
-                return self._steady_residual(unknowns, psi)
+                return self._steady_residuals(unknowns, psi[np.newaxis])[0]
 
             found.append(self._solved(at_azimuth, self._coordinates, "the blades find no steady motion"))
         self.unknowns = np.mean(found, axis=0)
@@ -134,18 +134,25 @@ class _TwoLoops:
         return solved
 
     def _mean_residual(self, unknowns: Array) -> Array:
-        """Mean of `_steady_residual` over the configurations (f)."""
-        return np.asarray(np.mean([self._steady_residual(unknowns, psi) for psi in self._azimuths], axis=0))
+        """Mean of `_steady_residuals` over the configurations (f)."""
+        return np.asarray(np.mean(self._steady_residuals(unknowns, self._azimuths), axis=0))
 
-    def _steady_residual(self, unknowns: Array, psi: Array) -> Array:
-        """Scaled residuals of steady flight at one azimuth, shape (n,): the body's as accelerations of a rigid one."""
-        problem = self._problem
+    def _steady_residuals(self, unknowns: Array, psi: Array) -> Array:
+        """Scaled residuals of steady flight at azimuths, shape (k, n): the body's as accelerations of a rigid one."""
+        problem, engine = self._problem, self._problem.engine
         x, swash = problem.state(self._condition, unknowns)
-        steady_balance(problem.params, x, swash, psi, np.zeros(3), problem.work, self._dx, self._imbalance)
-        residual = self._dx[problem.equations]
-        residual[:3] = self._imbalance[:3] / problem.aircraft.body.mass
-        residual[3:6] = self._inverse_inertia @ self._imbalance[3:]
-        return residual / problem.scales
+        states, angles, still_air = engine.lanes([x]), engine.lanes([swash.ravel()]), engine.memory(3)
+        rates, imbalance = np.empty((len(psi), len(x))), np.empty((len(psi), 6))
+        for first in range(0, len(psi), engine.n):
+            part, left = psi[first : first + engine.n], engine.memory(6)
+            places, slopes = engine.lanes(list(part)), engine.tick.slopes[0]
+            steady_balance(engine.model, states, angles, places, still_air, engine.work, slopes, left)
+            rates[first : first + len(part)] = slopes[:, : len(part)].T
+            imbalance[first : first + len(part)] = left[:, : len(part)].T
+        residuals = rates[:, problem.equations]
+        residuals[:, :3] = imbalance[:, :3] / problem.aircraft.body.mass
+        residuals[:, 3:6] = (self._inverse_inertia * imbalance[:, np.newaxis, 3:]).sum(axis=2)
+        return residuals / problem.scales
 
     def _failure(self, reason: str) -> TrimError:
         residual = self._problem.residual(self._condition, self.unknowns)

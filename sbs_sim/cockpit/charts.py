@@ -12,7 +12,7 @@ from viser import ViserServer, uplot
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.cockpit.told import line
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.plot_style import COLOURS
@@ -98,10 +98,10 @@ def rotor_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
     factor, kilo = (1e-3, "k") if heavy else (1.0, "")
 
     def thrust(snapshot: Snapshot) -> list[float]:
-        return [factor * float(snapshot.loads[j, P.THRUST]) for j in rotors]
+        return [factor * float(snapshot.loads[j, R.THRUST]) for j in rotors]
 
     def power(snapshot: Snapshot) -> list[float]:
-        return [factor * float(snapshot.loads[j, P.TORQUE]) * aircraft.rotors[j].speed for j in rotors]
+        return [factor * float(snapshot.loads[j, R.TORQUE]) * aircraft.rotors[j].speed for j in rotors]
 
     return (
         Chart("Flap", "deg", names("a0", "a1", "b1"), coordinates(layout.flap, DEGREES), 2, 0.1),

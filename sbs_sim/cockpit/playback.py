@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.errors import RecordingError
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.recording import Log, read
 from sbs_sim.recording.flight import flight_of
 from sbs_sim.simulation import Event, Snapshot
@@ -102,13 +102,13 @@ def _rotors(log: Log, rotors: int) -> tuple[Array, Array]:
     """Azimuths [rad], shape (messages, rotors), and loads, shape (messages, rotors, LOAD_SIZE), of all messages."""
     topic = log["rotors"]
     azimuths = np.stack([topic[f"rotors[{j}].azimuth"] for j in range(rotors)], axis=1)
-    loads = np.zeros((len(topic.time), rotors, P.LOAD_SIZE))
+    loads = np.zeros((len(topic.time), rotors, R.LOAD_SIZE))
     for j in range(rotors):
-        loads[:, j, P.THRUST] = topic[f"rotors[{j}].thrust"]
-        loads[:, j, P.TORQUE] = topic[f"rotors[{j}].torque"]
+        loads[:, j, R.THRUST] = topic[f"rotors[{j}].thrust"]
+        loads[:, j, R.TORQUE] = topic[f"rotors[{j}].torque"]
         for i, axis in enumerate("xyz"):
-            loads[:, j, P.FORCE + i] = topic[f"rotors[{j}].hub.force.{axis}"]
-            loads[:, j, P.MOMENT + i] = topic[f"rotors[{j}].hub.torque.{axis}"]
+            loads[:, j, R.FORCE + i] = topic[f"rotors[{j}].hub.force.{axis}"]
+            loads[:, j, R.MOMENT + i] = topic[f"rotors[{j}].hub.torque.{axis}"]
     return azimuths, loads
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import TrimCondition
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.simulation import Snapshot
@@ -78,7 +78,7 @@ def readout(aircraft: Aircraft, snapshot: Snapshot, status: Status, source: str)
     ground = to_earth @ state[S.VELOCITY : S.RATES]
     yaw, pitch, roll = quaternion_to_euler(state[S.ATTITUDE : S.VELOCITY])
     power = sum(
-        float(load[P.TORQUE]) * rotor.speed for load, rotor in zip(snapshot.loads, aircraft.rotors, strict=True)
+        float(load[R.TORQUE]) * rotor.speed for load, rotor in zip(snapshot.loads, aircraft.rotors, strict=True)
     )
     rows = (
         ("time", f"{snapshot.time:.2f}", "s"),
@@ -87,7 +87,7 @@ def readout(aircraft: Aircraft, snapshot: Snapshot, status: Status, source: str)
         ("climb", _fixed(-ground[2]), "m/s"),
         ("height", _fixed(-state[S.POSITION + 2]), "m"),
         ("heading", f"{round(math.degrees(yaw), 1) % 360:.1f}", "deg"),
-        ("thrust", *_scaled(float(snapshot.loads[:, P.THRUST].sum()), "N", 1)),
+        ("thrust", *_scaled(float(snapshot.loads[:, R.THRUST].sum()), "N", 1)),
         ("power", *_scaled(power, "W", 0)),
     )
     cells = "".join(

@@ -18,7 +18,7 @@ from viser.transforms import SO3
 
 from sbs_sim.aircraft import Aircraft, Rotor
 from sbs_sim.cockpit import geometry
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import hub_axes
 from sbs_sim.model.multiblade import blade_matrix
@@ -232,8 +232,8 @@ class RotorNodes:
     def draw_loads(self, loads: Array, shown: Shown) -> None:
         """Thrust along the shaft and moment on the hub."""
         for node, vector in (
-            (self._thrust, loads[P.THRUST] / self._whole.newtons_per_metre * self._up),
-            (self._moment, loads[P.MOMENT : P.MOMENT + 3] / self._whole.moment_per_metre),
+            (self._thrust, loads[R.THRUST] / self._whole.newtons_per_metre * self._up),
+            (self._moment, loads[R.MOMENT : R.MOMENT + 3] / self._whole.moment_per_metre),
         ):
             there = shown.arrows and float(np.linalg.norm(vector)) > LEAST_ARROW * self._whole.scale
             _show(node, there)

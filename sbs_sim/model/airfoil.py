@@ -1,8 +1,8 @@
 """Section lift and drag over Reynolds number and angle of attack (theory.md section 4).
 
 A table holds cl and cd on a full grid of Reynolds numbers and angles from -180 to 180 deg. Compiled code
-reads it as an array of cells, one 64-byte row per cell with the coefficients of the bilinear interpolation,
-laid out over three turns of the angle so that nothing has to be wrapped.
+reads it as an array of cells, two cache lines per cell with the coefficients of the interpolation, laid out over three
+turns of the angle so that nothing has to be wrapped.
 """
 
 from __future__ import annotations  # `help` then shows types by their names
@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim.content import ByContent
 from sbs_sim.errors import AirfoilError
-from sbs_sim.model.kernel import kernel
 
 Array = NDArray[np.float64]
 
@@ -361,33 +360,66 @@ def write_table(path: str | Path, table: AirfoilTable, comments: Sequence[str] =
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def cells(table: AirfoilTable) -> Array:
-    """Coefficients of the bilinear interpolation in every cell of a table, for `coefficients_in`.
+INTERPOLATIONS = ("smooth", "linear")
+DEGREE = 3  # of the polynomials along the angle
 
-    Within a cell, with x and y in 0..1 the fractions along angle and Reynolds number,
-    cl = c0 + c1 x + c2 y + c3 x y and cd = c4 + c5 x + c6 y + c7 x y.
+
+def cells(table: AirfoilTable, interpolation: str) -> Array:
+    """Coefficients of the interpolation in every cell of a table, for `sbs_sim.model.section`.
+
+    Along the angle "smooth" is the monotone cubic of Fritsch and Carlson: its slope is continuous, and it rises or
+    falls wherever the data do; "linear" joins the points by lines. Between Reynolds numbers both are linear.
+
+    Within a cell, with x in 0..1 the fraction along the angle, cl = sum_k (c_k0 + c_k1 Re) x^k and
+    cd = sum_k (c_k2 + c_k3 Re) x^k, k = 0 to 3.
 
     Parameters
     ----------
     table : AirfoilTable
+    interpolation : str
+        One of `INTERPOLATIONS`.
 
     Returns
     -------
-    ndarray, shape ((n_re - 1) * cell_grid(table)[0], 8)
-        The angle runs fastest and covers -540..540 deg, so that a section angle minus an atan2, -3 pi..3
-        pi, needs no wrapping.
+    ndarray, shape ((n_re - 1) * cell_grid(table)[0], 16)
+        c_00, c_01, c_02, c_03, c_10 ... of each cell. The angle runs fastest and covers -540..540 deg, so that a
+        section angle minus an arctangent, -3 pi..3 pi, needs no wrapping.
+
+    References
+    ----------
+    F. N. Fritsch, R. E. Carlson: Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17 (2), 1980.
     """
-    coefficients = np.concatenate([_bilinear(table.cl), _bilinear(table.cd)], axis=-1)
-    return np.ascontiguousarray(np.tile(coefficients, (1, TURNS, 1)).reshape(-1, 8))
+    lower, width = table.reynolds[:-1, None], np.diff(table.reynolds)[:, None]
+    parts = []
+    for values in (table.cl, table.cd):
+        powers = _polynomials(values, interpolation)  # (4, n_re, n_alpha - 1)
+        slope = np.diff(powers, axis=1) / width
+        parts += [powers[:, :-1] - lower * slope, slope]
+    rows = np.stack(parts, axis=-1).transpose(1, 2, 0, 3)
+    return np.ascontiguousarray(np.tile(rows, (1, TURNS, 1, 1)).reshape(-1, 4 * (DEGREE + 1)))
 
 
-def _bilinear(f: Array) -> Array:
-    """Coefficients of 1, x, y, xy per cell, shape (n_re - 1, n_alpha - 1, 4), of values (n_re, n_alpha)."""
-    corner = f[:-1, :-1]
-    along_alpha = f[:-1, 1:] - corner
-    along_re = f[1:, :-1] - corner
-    twist = f[1:, 1:] - f[1:, :-1] - along_alpha
-    return np.stack([corner, along_alpha, along_re, twist], axis=-1)
+def _polynomials(values: Array, interpolation: str) -> Array:
+    """Coefficients of x^0 to x^3 in every interval of the angle, shape (4, n_re, n_alpha - 1)."""
+    start, rise = values[:, :-1], np.diff(values, axis=1)
+    if interpolation == "linear":
+        return np.stack([start, rise, np.zeros_like(rise), np.zeros_like(rise)])
+    left = _monotone_slopes(rise)
+    right = np.roll(left, -1, axis=1)
+    return np.stack([start, left, 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise])
+
+
+def _monotone_slopes(rise: Array) -> Array:
+    """Slopes at the beginning of every interval, per interval; the intervals go round the circle.
+
+    The mean of the rises on both sides, not more than three times the lesser: section 4 of Fritsch and Carlson. Zero at
+    a highest or lowest point.
+    """
+    before = np.roll(rise, 1, axis=1)
+    least = 3.0 * np.minimum(np.abs(before), np.abs(rise))
+    mean = 0.5 * (before + rise)
+    limited = np.where(np.abs(mean) > least, np.copysign(least, mean), mean)
+    return np.where(before * rise > 0.0, limited, 0.0)
 
 
 def cell_grid(table: AirfoilTable) -> tuple[int, float, float]:
@@ -406,46 +438,9 @@ def cell_grid(table: AirfoilTable) -> tuple[int, float, float]:
     return TURNS * per_turn, -TURNS * np.pi, per_turn / (2 * np.pi)
 
 
-@kernel
-def cell_of(place, count):
-    """Number of the cell in which a place lies, as a float: the last of `count` at its far end, and for NaN."""
-    # A comparison with NaN is false; what its conversion gives is then not used.
-    return float(np.int32(place)) if place < count else count - 1.0
-
-
-@kernel
-def coefficients_in(cells, row, x, y):
-    """Lift and drag coefficient within a cell.
-
-    Parameters
-    ----------
-    cells : ndarray, shape (n, 8)
-        `cells` of one or more tables, one after the other.
-    row : unsigned int
-    x, y : float
-        Fractions along angle and Reynolds number, 0 to 1.
-
-    Returns
-    -------
-    cl, cd : float
-    """
-    cl = cells[row, 0] + cells[row, 1] * x + (cells[row, 2] + cells[row, 3] * x) * y
-    cd = cells[row, 4] + cells[row, 5] * x + (cells[row, 6] + cells[row, 7] * x) * y
-    return cl, cd
-
-
-@kernel
-def clamp(value, upper):
-    """Limit a number to 0..upper; NaN stays NaN.
-
-    The place of an angle is clamp((alpha - alpha0) * inverse_step, n_alpha). The place of a Reynolds number is the sum
-    over the cells of clamp((reynolds - lower knot) / width, 1): every cell below counts whole, every one above not.
-    """
-    value = 0.0 if value < 0.0 else value
-    return upper if value > upper else value
-
-
-def interpolate(table: AirfoilTable, reynolds: ArrayLike, alpha: ArrayLike) -> tuple[Array, Array]:
+def interpolate(
+    table: AirfoilTable, reynolds: ArrayLike, alpha: ArrayLike, interpolation: str = "smooth"
+) -> tuple[Array, Array]:
     """Lift and drag coefficients at arrays of Reynolds numbers and angles, for plots and checks.
 
     Parameters
@@ -455,6 +450,8 @@ def interpolate(table: AirfoilTable, reynolds: ArrayLike, alpha: ArrayLike) -> t
         Clamped to the table's range.
     alpha : array_like
         Angles of attack [rad] of any turn; broadcast against `reynolds`.
+    interpolation : str
+        See `cells`.
 
     Returns
     -------
@@ -464,14 +461,9 @@ def interpolate(table: AirfoilTable, reynolds: ArrayLike, alpha: ArrayLike) -> t
     knots, step = table.reynolds, table.alpha[1] - table.alpha[0]
     clamped = np.clip(reynolds, knots[0], knots[-1])
     i = np.clip(np.searchsorted(knots, clamped, side="right") - 1, 0, len(knots) - 2)
-    y = (clamped - knots[i]) / (knots[i + 1] - knots[i])
     place = np.mod(np.asarray(alpha, dtype=np.float64) + np.pi, 2 * np.pi) / step
     j = np.clip(place.astype(np.int64), 0, len(table.alpha) - 2)
-    x = place - j
-
-    def blend(f: Array) -> Array:
-        low = f[i, j] * (1 - x) + f[i, j + 1] * x
-        high = f[i + 1, j] * (1 - x) + f[i + 1, j + 1] * x
-        return low * (1 - y) + high * y
-
-    return blend(table.cl), blend(table.cd)
+    rows = cells(table, interpolation).reshape(len(knots) - 1, -1, DEGREE + 1, 4)[i, j]
+    powers = (place - j)[..., None] ** np.arange(DEGREE + 1)
+    lift, lift_slope, drag, drag_slope = np.moveaxis(np.einsum("...k,...kc->...c", powers, rows), -1, 0)
+    return lift + lift_slope * clamped, drag + drag_slope * clamped

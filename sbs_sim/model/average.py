@@ -1,4 +1,4 @@
-"""Averages of the derivative over the azimuth (theory.md section 8; paper eq. [15])."""
+"""The derivative at many states and azimuths, and averages over the azimuth (theory.md section 8; paper eq. [15])."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.model.dynamics import evaluate
 from sbs_sim.model.kernel import entry
 
 
@@ -16,33 +15,49 @@ def azimuths(blades: Sequence[int], count: int) -> NDArray[np.float64]:
 
 
 @entry
-def averaged_derivative(p, x, swash, azimuth_count, still_air, work, dx, loads):
-    """Mean of the state derivative and of the rotor loads over azimuth configurations.
+def averaged_derivative(derivative, model, x, swash, psi, wind, work, tick, dx, loads):
+    """Mean of the state derivative, of the specific force and of the rotor loads over azimuth configurations.
 
-    Configuration k of N_c has the first blade of a rotor with N_b blades at 2 pi k / (N_b N_c).
+    As many of them at once as there are lanes; the sum goes from one to the next in any case.
 
     Parameters
     ----------
-    p, x, swash, work : see `sbs_sim.model.dynamics.derivative`
-    azimuth_count : int
-        N_c.
-    still_air : ndarray, shape (3,)
-        Wind, NED [m/s].
-    dx : ndarray, shape (size,)
-        Output: mean derivative.
-    loads : ndarray, shape (n_rotors, LOAD_SIZE)
-        Output: mean of `work.loads`.
+    derivative, model, work, tick : see `sbs_sim.model.integrate.advance`
+    x : ndarray, shape (size,)
+        Simulation state.
+    swash : ndarray, shape (3 n_rotors,)
+        [rad]
+    psi : ndarray, shape (count, n_rotors)
+        [rad]
+    wind : ndarray, shape (3,)
+        NED [m/s].
+    dx : ndarray, shape (size + 3,)
+        Output: mean derivative, and mean specific force [m/s^2].
+    loads : ndarray, shape (8 n_rotors,)
+        Output: mean of `work.load_rows`.
     """
-    dx[:] = 0.0
-    loads[:, :] = 0.0
-    slope = work.stages[0]
-    for k in range(azimuth_count):
-        for j in range(p.rotor.shape[0]):
-            n_blades = p.first_blade[j + 1] - p.first_blade[j]
-            work.psi[j] = 2.0 * math.pi * k / (n_blades * azimuth_count)
-        evaluate(p, x, swash, work.psi, still_air, work, slope)
-        for i in range(dx.size):
-            dx[i] += slope[i] / azimuth_count
-        for j in range(p.rotor.shape[0]):
-            for m in range(loads.shape[1]):
-                loads[j, m] += work.loads[j, m] / azimuth_count
+    size, lanes, count = x.size, tick.stage.shape[1], psi.shape[0]
+    for i in range(dx.size):
+        dx[i] = 0.0
+    for i in range(loads.size):
+        loads[i] = 0.0
+    angles = tick.slopes[1]  # more rows than a rotor has angles
+    for lane in range(lanes):
+        for i in range(size):
+            tick.stage[i, lane] = x[i]
+        for i in range(swash.size):
+            angles[i, lane] = swash[i]
+        for i in range(3):
+            tick.wind[i, lane] = wind[i]
+    for first in range(0, count, lanes):
+        for lane in range(lanes):
+            for j in range(psi.shape[1]):
+                tick.psi[j, lane] = psi[min(first + lane, count - 1), j]
+        derivative(model, tick.stage, angles[: swash.size], tick.psi, tick.wind, work, tick.slopes[0], True)
+        for lane in range(min(lanes, count - first)):
+            for i in range(size):
+                dx[i] += tick.slopes[0, i, lane] / count
+            for i in range(3):
+                dx[size + i] += work.vector[i, lane] / count
+            for i in range(loads.size):
+                loads[i] += work.load_rows[i, lane] / count

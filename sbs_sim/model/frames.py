@@ -11,33 +11,59 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sbs_sim.model.kernel import kernel
+from sbs_sim.lanes import Matrix, Vector, as_lanes, as_records, cross, dot, greatest, least, sqrt
+from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.trigonometry import TINY, angle_of, cosine_sine, inverse_root
 
 Array = NDArray[np.float64]
 
 
+ONE = np.zeros(1, [("lanes", float, (1,))])  # record of a single lane
+
+
 def euler_to_quaternion(yaw: float, pitch: float, roll: float) -> Array:
     """Quaternion (w, x, y, z), body to earth, of Euler angles [rad] (Stevens and Lewis, section 1.3)."""
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-    return np.array(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )
+    quaternion = np.empty((4, 1))
+    _quaternion_of(np.array([[yaw], [pitch], [roll]], dtype=float), ONE, quaternion)
+    return quaternion[:, 0]
+
+
+@entry
+def _quaternion_of(angles, like, out):
+    """Quaternions, shape (4, n), of yaw, pitch and roll, (3, n); `like` are records of n lanes."""
+    records = as_records(like)
+    given, quaternion = as_lanes(angles, records), as_lanes(out, records)
+    cy, sy = cosine_sine(0.5 * given[0])
+    cp, sp = cosine_sine(0.5 * given[1])
+    cr, sr = cosine_sine(0.5 * given[2])
+    quaternion[0], quaternion[1] = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    quaternion[2], quaternion[3] = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
 
 
 def quaternion_to_euler(quaternion: ArrayLike) -> tuple[float, float, float]:
     """Yaw, pitch, roll [rad] of a unit quaternion (w, x, y, z); pitch within +-pi/2."""
-    w, x, y, z = (float(value) for value in np.asarray(quaternion))
-    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
-    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    angles = np.empty((3, 1))
+    _angles_of(np.array(quaternion, dtype=float).reshape(4, 1), ONE, angles)
+    yaw, pitch, roll = angles[:, 0].tolist()
     return yaw, pitch, roll
+
+
+@entry
+def _angles_of(quaternions, like, out):
+    """Yaw, pitch and roll, shape (3, n), of quaternions, (4, n); `like` are records of n lanes."""
+    records = as_records(like)
+    given, angles = as_lanes(quaternions, records), as_lanes(out, records)
+    w, x, y, z = given[0], given[1], given[2], given[3]
+    sine = least(greatest(2.0 * (w * y - z * x), -1.0), 1.0)
+    angles[0] = direction(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    angles[1] = angle_of(sine, sqrt(1.0 - sine * sine), 1.0)
+    angles[2] = direction(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+
+
+@kernel
+def direction(y, x):
+    """Angle of the point (x, y) from the x axis [rad]; 0 at the origin."""
+    return angle_of(y, x, inverse_root(x * x + y * y + TINY))
 
 
 def euler_angles(quaternions: Array) -> Array:
@@ -47,6 +73,12 @@ def euler_angles(quaternions: Array) -> Array:
     pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     return np.stack([yaw, pitch, roll], axis=1)
+
+
+def down_of(quaternions: Array) -> Array:
+    """Body components of the direction down, shape (n, 3), at attitudes (w, x, y, z), (n, 4)."""
+    w, x, y, z = quaternions.T
+    return np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1)
 
 
 def to_body(quaternions: Array, vectors: Array) -> Array:
@@ -59,7 +91,13 @@ def to_body(quaternions: Array, vectors: Array) -> Array:
 def rotation_matrix(quaternion: ArrayLike) -> Array:
     """R_NB, shape (3, 3), of a unit quaternion (w, x, y, z): earth components = R_NB @ body components."""
     w, x, y, z = np.asarray(quaternion, dtype=float)
-    return np.array(rotation_rows(w, x, y, z)).reshape(3, 3)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def hub_axes(shaft_direction: ArrayLike) -> Array:
@@ -78,47 +116,33 @@ def hub_axes(shaft_direction: ArrayLike) -> Array:
     ndarray, shape (3, 3)
         Columns x_h, y_h, z_h = -u in body components.
     """
-    up = np.array([0.0, 0.0, -1.0])
-    shaft = np.asarray(shaft_direction, dtype=float)
-    shaft = shaft / np.linalg.norm(shaft)
-    cosine = float(up @ shaft)
-    axis = np.cross(up, shaft)
-    sine_squared = float(axis @ axis)
+    x, y, z = (float(value) for value in np.asarray(shaft_direction, dtype=float))
+    length = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / length, y / length, z / length
+    # the axis up x shaft has no part along z, and its length is the sine
+    axis_x, axis_y, cosine = y, -x, -z
+    sine_squared = axis_x * axis_x + axis_y * axis_y
     if sine_squared == 0.0:  # straight down, every half turn is as small as the other: take the one about x
         return np.eye(3) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
-    skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     # (1 - cos) / sin^2 instead of 1 / (1 + cos): the latter loses its digits near a shaft that points down
-    return np.eye(3) + skew + (1 - cosine) / sine_squared * (skew @ skew)
+    share = (1.0 - cosine) / sine_squared
+    xx, yy, xy = -(axis_y * axis_y) * share, -(axis_x * axis_x) * share, axis_x * axis_y * share
+    return np.array([[1.0 + xx, xy, axis_y], [xy, 1.0 + yy, -axis_x], [-axis_y, axis_x, 1.0 - sine_squared * share]])
 
 
 @kernel
-def rotation_rows(w, x, y, z):
-    """Nine elements of R_NB, row by row, of a unit quaternion."""
-    return (
-        1 - 2 * (y * y + z * z),
-        2 * (x * y - w * z),
-        2 * (x * z + w * y),
-        2 * (x * y + w * z),
-        1 - 2 * (x * x + z * z),
-        2 * (y * z - w * x),
-        2 * (x * z - w * y),
-        2 * (y * z + w * x),
-        1 - 2 * (x * x + y * y),
+def rotation(w, x, y, z):
+    """R_NB of a unit quaternion in lanes: `rotation @ body` is in earth axes, `transposed(it) @ earth` in body's."""
+    return Matrix(
+        Vector(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        Vector(2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        Vector(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
     )
 
 
 @kernel
-def quaternion_rates(w, x, y, z, p, q, r):
-    """Time derivative of the attitude quaternion for body rates p, q, r [rad/s]."""
-    return (
-        0.5 * (-x * p - y * q - z * r),
-        0.5 * (w * p + y * r - z * q),
-        0.5 * (w * q + z * p - x * r),
-        0.5 * (w * r + x * q - y * p),
-    )
-
-
-@kernel
-def cross(ax, ay, az, bx, by, bz):
-    """Vector product of two triples."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+def quaternion_rates(w, x, y, z, rates):
+    """Time derivative of the attitude quaternion for body rates [rad/s]."""
+    vector = Vector(x, y, z)
+    turning = rates * w + cross(vector, rates)
+    return -0.5 * dot(vector, rates), 0.5 * turning.x, 0.5 * turning.y, 0.5 * turning.z

@@ -1,10 +1,23 @@
 """Drag of the fuselage as three flat plates (theory.md section 5)."""
 
+from sbs_sim.lanes import Vector
 from sbs_sim.model.kernel import kernel
 
 
 @kernel
-def plate_drag(density, area_x, area_y, area_z, u, v, w):
-    """Force at the c.g. in body axes [N] for the velocity u, v, w relative to the air [m/s]."""
+def plate_drag(density, areas, air):
+    """Force at the c.g. in body axes [N].
+
+    Parameters
+    ----------
+    density : lanes
+        [kg/m^3]
+    areas : Vector
+        [m^2]
+    air : Vector
+        Velocity relative to the air, body axes [m/s].
+    """
     half = -0.5 * density
-    return half * area_x * abs(u) * u, half * area_y * abs(v) * v, half * area_z * abs(w) * w
+    return Vector(
+        half * areas.x * abs(air.x) * air.x, half * areas.y * abs(air.y) * air.y, half * areas.z * abs(air.z) * air.z
+    )

@@ -3,35 +3,36 @@
 The model knows nothing of a fuselage's shape: what can touch are the centre of gravity and the rims of the rotor discs.
 """
 
-import math
-
-from sbs_sim.model import params as P
-from sbs_sim.model.frames import rotation_rows
+from sbs_sim.lanes import Vector, as_lanes, as_records, dot, greatest, sqrt
+from sbs_sim.model.frames import rotation
 from sbs_sim.model.kernel import entry, kernel
 
 
 @entry
-def lowest_point(p, x):
+def lowest_point(rotors, x, out):
     """Down coordinate of the lowest point of the aircraft [m].
 
     Parameters
     ----------
-    p : Params
-    x : ndarray, shape (size,)
-        Simulation state.
+    rotors : structured ndarray ROTOR, shape (n_rotors,)
+    x : ndarray, shape (size, n)
+        Simulation states.
+    out : ndarray, shape (1, n)
+        Output.
     """
-    return lowest(p, x)
+    records = as_records(rotors)
+    as_lanes(out, records)[0] = lowest(records, as_lanes(x, records))
 
 
 @kernel
-def lowest(p, x):
+def lowest(rotors, x):
     """What `lowest_point` gives, for compiled callers."""
-    rot = rotation_rows(x[3], x[4], x[5], x[6])
-    down = x[2]
-    for j in range(p.rotor.shape[0]):
-        rotor, a = p.rotor[j], p.axes[j]
-        hub = rot[6] * rotor[P.HUB_X] + rot[7] * rotor[P.HUB_Y] + rot[8] * rotor[P.HUB_Z]
-        upright = rot[6] * a[0, 2] + rot[7] * a[1, 2] + rot[8] * a[2, 2]  # cosine of the shaft's angle to the vertical
-        rim = x[2] + hub + rotor[P.RADIUS] * math.sqrt(max(0.0, 1.0 - upright * upright))
-        down = max(down, rim)
-    return down
+    down = rotation(x[3], x[4], x[5], x[6]).z  # the direction down in body axes
+    deepest = x[2]
+    for j in range(rotors.shape[0]):
+        rotor = rotors[j]
+        shaft = Vector(rotor.axes.x.z, rotor.axes.y.z, rotor.axes.z.z)
+        upright = dot(down, shaft)  # cosine of the shaft's angle to the vertical
+        rim = rotor.radius * sqrt(greatest(1.0 - upright * upright, 0.0))
+        deepest = greatest(deepest, x[2] + dot(down, rotor.hub) + rim)
+    return deepest

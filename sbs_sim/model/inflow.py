@@ -5,80 +5,105 @@ D. A. Peters, N. HaQuang: Dynamic inflow for practical applications, J. AHS 33 (
 """
 
 import math
+from typing import Any, NamedTuple
 
+from sbs_sim.lanes import Vector, as_lanes, as_records, cross, dot, select, sqrt
 from sbs_sim.model.kernel import entry, kernel
 
-APPARENT_MASS = 8.0 / (3.0 * math.pi)
-APPARENT_INERTIA = 16.0 / (45.0 * math.pi)
+INVERSE_MASS = 3.0 * math.pi / 8.0  # 1 / M_0, of the apparent mass
+INVERSE_INERTIA = 45.0 * math.pi / 16.0  # 1 / M_1
 SKEW = 15.0 * math.pi / 64.0
 # Total flow through the disc is never less than this share of the tip speed (1.3 mm/s here): it keeps the
 # inflow equations finite where the flow through the disc vanishes, and changes the hover flow by 2e-8.
 LEAST_FLOW = 1e-5
 
 
-@kernel
-def inflow_rates(lambda0, lambdas, lambdac, mu_x, mu_y, mu_z, sense, duct, speed, thrust, sine, cosine, cyclic):
-    """Time derivatives of lambda0, lambdas, lambdac [1/s].
+class DiscFlow(NamedTuple):
+    """V_T, V_m of eq. (6.3), and the skew of the wake along x and y, of the present flow through the disc."""
 
-    mu_x, mu_y, mu_z: velocity of the hub relative to the air in hub axes over the tip speed. duct: wake expansion
-    ratio a_w. thrust, sine, cosine: C_T and the coefficients m_s, m_c of the aerodynamic moments, where more lift
-    aft (psi = 0) gives more inflow aft. cyclic: 0 holds lambdas and lambdac.
+    total: Any
+    cyclic: Any
+    skew_x: Any
+    skew_y: Any
+
+
+@kernel
+def disc_flow(lambda0, mu, sense):
+    """Flow through a disc; mu is the velocity of the hub relative to the air over the tip speed, hub axes."""
+    through = lambda0 - mu.z
+    edgewise = mu.x * mu.x + mu.y * mu.y
+    total = sqrt(edgewise + through * through + LEAST_FLOW * LEAST_FLOW)
+    cyclic = (edgewise + through * (through + lambda0)) / total
+    inverse = 1.0 / (total + abs(through))
+    return DiscFlow(total, cyclic, mu.x * inverse, -(sense * mu.y * inverse))
+
+
+@kernel
+def inflow_rates(rotor, inflow, flow, loads, cyclic):
+    """Time derivatives of lambda0, lambdac, lambdas [1/s], eq. (6.1), linear in the inflow and in the loads.
+
+    Parameters
+    ----------
+    rotor : record ROTOR
+    inflow : Vector
+        lambda0, lambdac, lambdas.
+    flow : DiscFlow
+    loads : Vector
+        C_T and the coefficients m_c, m_s of the aerodynamic moments, where more lift aft (psi = 0) gives more inflow
+        aft.
+    cyclic : int
+        0 holds lambdac and lambdas.
     """
-    flow, flow_cyclic, xc, xs = _flow(lambda0, mu_x, mu_y, mu_z, sense)
-    return _rates(lambda0, lambdas, lambdac, flow, flow_cyclic, xc, xs, duct, speed, thrust, sine, cosine, cyclic)
-
-
-@entry
-def inflow_matrix(lambda0, mu_x, mu_y, mu_z, sense, duct, speed, cyclic, out):
-    """C^lambda of lambda' = C^lambda lambda + E^lambda (paper, appendix B): the flow through the disc is held.
-
-    Parameters are those of `inflow_rates`; out, shape (3, 3), is in the order lambda0, lambdas, lambdac [1/s].
-    """
-    flow, flow_cyclic, xc, xs = _flow(lambda0, mu_x, mu_y, mu_z, sense)
-    for i in range(3):
-        l0, ls, lc = 1.0 * (i == 0), 1.0 * (i == 1), 1.0 * (i == 2)
-        out[0, i], out[1, i], out[2, i] = _rates(
-            l0, ls, lc, flow, flow_cyclic, xc, xs, duct, speed, 0.0, 0.0, 0.0, cyclic
-        )
-
-
-@kernel
-def _flow(lambda0, mu_x, mu_y, mu_z, sense):
-    """V_T, V_m and the skew of the wake along x and y, all of the present flow through the disc."""
-    lam = lambda0 - mu_z
-    mu_squared = mu_x * mu_x + mu_y * mu_y
-    flow = math.sqrt(mu_squared + lam * lam + LEAST_FLOW * LEAST_FLOW)
-    flow_cyclic = (mu_squared + lam * (lam + lambda0)) / flow
-    denominator = flow + abs(lam)
-    return flow, flow_cyclic, mu_x / denominator, -sense * mu_y / denominator
-
-
-@kernel
-def _rates(lambda0, lambdas, lambdac, flow, flow_cyclic, xc, xs, duct, speed, thrust, sine, cosine, cyclic):
-    """Rates of the inflow states [1/s], linear in them and in the loads."""
-    l11 = 2.0 * duct * duct
-    if cyclic == 0:
-        return speed * (thrust - flow * lambda0 / l11) / APPARENT_MASS, 0.0, 0.0
-    y0, yc, ys = _solve_gain(l11, xc, xs, lambda0, lambdac, lambdas)
-    return (
-        speed * (thrust - flow * y0) / APPARENT_MASS,
-        speed * (sine - flow_cyclic * ys) / APPARENT_INERTIA,
-        speed * (cosine - flow_cyclic * yc) / APPARENT_INERTIA,
+    uniform_gain = 2.0 * rotor.duct * rotor.duct
+    driven = solve_gain(uniform_gain, flow.skew_x, flow.skew_y, inflow)
+    # without its cyclic parts the uniform inflow follows Glauert's single equation
+    uniform = select(cyclic == 1, driven.x, inflow.x / uniform_gain)
+    inertia = rotor.speed * INVERSE_INERTIA
+    return Vector(
+        rotor.speed * INVERSE_MASS * (loads.x - flow.total * uniform),
+        select(cyclic == 1, inertia * (loads.y - flow.cyclic * driven.y), 0.0),
+        select(cyclic == 1, inertia * (loads.z - flow.cyclic * driven.z), 0.0),
     )
 
 
 @kernel
-def _solve_gain(l11, xc, xs, b0, bc, bs):
+def solve_gain(uniform_gain, skew_x, skew_y, b):
     """Solve Lt y = b in the order (0, c, s), Lt of theory.md section 6, by Cramer's rule."""
-    ring = 2.0 * (1.0 + xc * xc + xs * xs)
-    a11, a12, a13 = l11, -SKEW * xc, -SKEW * xs
-    a21, a22, a23 = SKEW * xc, ring - 4.0 * xc * xc, -4.0 * xc * xs
-    a31, a32, a33 = SKEW * xs, a23, ring - 4.0 * xs * xs
-    c11 = a22 * a33 - a23 * a32
-    c12 = a23 * a31 - a21 * a33
-    c13 = a21 * a32 - a22 * a31
-    inverse = 1.0 / (a11 * c11 + a12 * c12 + a13 * c13)
-    y0 = (b0 * c11 + bc * (a13 * a32 - a12 * a33) + bs * (a12 * a23 - a13 * a22)) * inverse
-    yc = (b0 * c12 + bc * (a11 * a33 - a13 * a31) + bs * (a13 * a21 - a11 * a23)) * inverse
-    ys = (b0 * c13 + bc * (a12 * a31 - a11 * a32) + bs * (a11 * a22 - a12 * a21)) * inverse
-    return y0, yc, ys
+    ring = 2.0 * (1.0 + skew_x * skew_x + skew_y * skew_y)
+    mixed = -4.0 * skew_x * skew_y
+    first = Vector(uniform_gain, SKEW * skew_x, SKEW * skew_y)
+    second = Vector(-SKEW * skew_x, ring - 4.0 * skew_x * skew_x, mixed)
+    third = Vector(-SKEW * skew_y, mixed, ring - 4.0 * skew_y * skew_y)
+    minors = cross(second, third)
+    inverse = 1.0 / dot(first, minors)
+    return Vector(
+        dot(b, minors) * inverse, dot(b, cross(third, first)) * inverse, dot(b, cross(first, second)) * inverse
+    )
+
+
+@entry
+def inflow_matrix(rotors, number, lambda0, mu, cyclic, out):
+    """C^lambda of lambda' = C^lambda lambda + E^lambda (paper, appendix B): the flow through the disc is held.
+
+    Parameters
+    ----------
+    rotors : structured ndarray ROTOR, shape (n_rotors,)
+    number : int
+        Of the rotor.
+    lambda0 : ndarray, shape (1, n)
+    mu : ndarray, shape (3, n)
+        Velocity of the hub relative to the air over the tip speed, hub axes.
+    cyclic : int
+        0 holds lambdas and lambdac.
+    out : ndarray, shape (3, 3, n)
+        Output in the order lambda0, lambdas, lambdac [1/s].
+    """
+    rotor = as_records(rotors)[number]
+    velocity, matrix = as_lanes(mu, rotor), as_lanes(out, rotor)
+    uniform = as_lanes(lambda0, rotor)[0]
+    flow = disc_flow(uniform, Vector(velocity[0], velocity[1], velocity[2]), rotor.sense)
+    none = Vector(0.0, 0.0, 0.0)
+    for i in range(3):
+        unit = Vector(1.0 * (i == 0), 1.0 * (i == 2), 1.0 * (i == 1))
+        rates = inflow_rates(rotor, unit, flow, none, cyclic)
+        matrix[0, i], matrix[1, i], matrix[2, i] = rates.x, rates.z, rates.y

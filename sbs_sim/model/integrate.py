@@ -4,21 +4,21 @@ import math
 
 import numpy as np
 
-from sbs_sim.model import params as P
-from sbs_sim.model import state as S
-from sbs_sim.model.dynamics import evaluate_rotors
+from sbs_sim.lanes import all_lanes, any_lane, as_lanes, as_records, floor, sqrt
 from sbs_sim.model.ground import lowest
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_rotation_terms
 from sbs_sim.model.wind import wind_at
 
 RK4, PARTITIONED, TSIT5 = range(3)
-STAGE, FIRST_SLOPE = 0, 1  # rows of Work.stages
+MOST_STAGES = 6
+TURN, INVERSE_TURN = 2.0 * math.pi, 1.0 / (2.0 * math.pi)
+FLYING = -1  # no state is to blame for an end
 
 
 def _tableau(*rows):
     """Butcher's tableau: coefficients of the stages, filled up with zeros, and the weights in the last row."""
-    table = np.zeros((P.MOST_STAGES + 1, P.MOST_STAGES))
+    table = np.zeros((MOST_STAGES + 1, MOST_STAGES))
     for i, row in enumerate(rows[:-1]):
         table[i, : len(row)] = row
     table[-1, : len(rows[-1])] = rows[-1]
@@ -42,124 +42,169 @@ STAGES = np.array([4, 4, 6])
 
 
 @entry
-def advance(p, x, swash, psi0, first_step, steps, h, wind, method, bounds, work):
-    """Advance the state by a tick of `steps` steps; it is left at the last step that was plausible.
+def advance(derivative, model, x, swash, psi0, first_step, steps, h, wind, method, bounds, work, tick, done, culprit):
+    """Advance flights by a tick of `steps` steps; each is left at the last step that was plausible.
 
     Parameters
     ----------
-    p : Params
-    x : ndarray, shape (size,)
-        Simulation state at step `first_step`; overwritten.
-    swash : ndarray, shape (n_rotors, 3)
+    derivative : Address
+        Of the entry.
+    model : Model
+    x : ndarray, shape (size, n)
+        Simulation states at step `first_step`; overwritten.
+    swash : ndarray, shape (3 n_rotors, n)
         Swashplate angles, constant over the tick [rad].
-    psi0 : ndarray, shape (n_rotors,)
+    psi0 : ndarray, shape (n_rotors, n)
         Azimuths at step 0 [rad]; later ones follow from the number of the step.
     first_step, steps : int
     h : float
         Step [s].
-    wind : ndarray, shape (WIND_SIZE,)
+    wind : ndarray, shape (WIND_SIZE, n)
         Air of this tick.
     method : int
         RK4, PARTITIONED or TSIT5.
-    bounds : ndarray, shape (size + 1,)
+    bounds : ndarray, shape (size + 1, n)
         Largest magnitude of each state that is still plausible, and the down coordinate of the ground [m].
     work : Work
-
-    Returns
-    -------
-    done : int
-        Steps made; fewer than `steps` if the next one would leave the plausible.
-    culprit : int
-        Index of the state that would, -1 if none, `size` if the aircraft would touch the ground.
+    tick : Tick
+        Memory.
+    done : ndarray of int64, shape (n,)
+        Output: steps made; fewer than `steps` if the next one would leave the plausible.
+    culprit : ndarray of int64, shape (n,)
+        -1 for flights that go on; others stay as they are. Overwritten with the index of the state that would leave the
+        plausible, `size` where the aircraft would touch the ground.
     """
+    for lane in range(culprit.size):
+        done[lane] = 0
     for i in range(steps):
-        fraction = i / steps
-        _step(p, x, swash, psi0, first_step + i, h, wind, fraction, 1.0 / steps, method, work)
-        new = work.stages[STAGE]
-        culprit = _first_implausible(p, new, bounds)
-        if culprit >= 0:
-            return i, culprit
-        copy_numbers(new, x)
-    return steps, -1
+        make_step(
+            derivative, model, x, swash, psi0, first_step + i, h, wind, i / steps, 1.0 / steps, method, work, tick
+        )
+        if all_plausible(model, tick.stage, bounds, culprit):
+            copy_rows(tick.stage, x)
+            for lane in range(culprit.size):
+                done[lane] = i + 1
+        elif not take_lanes(model, x, tick, bounds, i, done, culprit):
+            return
 
 
 @kernel
-def _step(p, x, swash, psi0, number, h, wind, fraction, share, method, work):
-    """One step from x; the new state is left in the stage row."""
-    stage, tableau, count = work.stages[STAGE], TABLEAUS[method], STAGES[method]
-    time, rotors = number * h, p.rotor.shape[0]
+def make_step(derivative, model, x, swash, psi0, number, h, wind, fraction, share, method, work, tick):
+    """One step from x; the new state is left in `tick.stage`."""
+    rotors = as_records(model.rotors)
+    state, stage, air = as_lanes(x, rotors), as_lanes(tick.stage, rotors), as_lanes(wind, rotors)
+    slopes, psi, blowing = as_lanes(tick.slopes, rotors), as_lanes(tick.psi, rotors), as_lanes(tick.wind, rotors)
+    start, tableau, count, time = as_lanes(psi0, rotors), TABLEAUS[method], STAGES[method], number * h
     for k in range(count):
-        ahead = _combine(x, work.stages, tableau[k], k, h)
-        _azimuths(p, psi0, number, ahead, h, work.psi)
-        wind_at(wind, time + ahead * h, fraction + ahead * share, work.wind)
-        slope = work.stages[FIRST_SLOPE + k]
-        evaluate_rotors(p, stage, swash, work.psi, work.wind, work, slope, 0, rotors, False)
+        ahead = combine(state, slopes, tableau[k], k, h, stage)
+        set_azimuths(rotors, start, (number + ahead) * h, psi)
+        wind_at(air, time + ahead * h, fraction + ahead * share, blowing)
+        derivative(model, tick.stage, swash, tick.psi, tick.wind, work, tick.slopes[k], False)
         if method == PARTITIONED and k > 0:
-            _freeze_forcing(p, x, stage, work.stages[FIRST_SLOPE], slope)
-    _combine(x, work.stages, tableau[-1], count, h)
-    norm = 1.0 / math.sqrt(stage[3] ** 2 + stage[4] ** 2 + stage[5] ** 2 + stage[6] ** 2)
-    for i in range(S.ATTITUDE, S.ATTITUDE + 4):
-        stage[i] *= norm
+            freeze_forcing(as_records(model.switches)[0], rotors, state, stage, slopes[0], slopes[k])
+    combine(state, slopes, tableau[-1], count, h, stage)
+    w, a, b, c = stage[3], stage[4], stage[5], stage[6]
+    shrink = 1.0 / sqrt(w * w + a * a + b * b + c * c)
+    stage[3], stage[4], stage[5], stage[6] = w * shrink, a * shrink, b * shrink, c * shrink
 
 
 @kernel
-def _combine(x, stages, factors, count, h):
-    """Set the stage row to x plus h times a sum of the first slopes; the sum of its factors is returned."""
-    stage = stages[STAGE]
-    copy_numbers(x, stage)
+def combine(state, slopes, factors, count, h, stage):
+    """Set the stage to the state plus h times a sum of the first slopes; the sum of their factors is returned."""
+    for i in range(state.shape[0]):
+        stage[i] = state[i]
     ahead = 0.0
     for m in range(count):
         factor = factors[m]
         if factor != 0.0:
-            slope = stages[FIRST_SLOPE + m]
-            for i in range(x.size):
-                stage[i] += h * factor * slope[i]
+            step, slope = h * factor, slopes[m]
+            for i in range(state.shape[0]):
+                stage[i] = stage[i] + step * slope[i]
             ahead += factor
     return ahead
 
 
 @kernel
-def copy_numbers(source, target):
+def set_azimuths(rotors, start, time, psi):
+    """Azimuths of all rotors a time after step 0, within 0 and 2 pi."""
+    for j in range(rotors.shape[0]):
+        angle = start[j] + rotors[j].speed * time
+        psi[j] = angle - TURN * floor(angle * INVERSE_TURN)
+
+
+@entry
+def azimuths_at(rotors, psi0, time, psi):
+    """Azimuths [rad], shape (n_rotors, n), a time after step 0, as a step has them."""
+    records = as_records(rotors)
+    set_azimuths(records, as_lanes(psi0, records), time, as_lanes(psi, records))
+
+
+@kernel
+def copy_rows(source, target):
     """Copy numbers one by one: a slice would be allocated."""
-    for i in range(source.size):
-        target[i] = source[i]
+    for i in range(source.shape[0]):
+        for lane in range(source.shape[1]):
+            target[i, lane] = source[i, lane]
 
 
 @kernel
-def _azimuths(p, psi0, number, ahead, h, psi):
-    """Azimuths of all rotors a part of a step after step `number`, within 0 and 2 pi."""
-    for j in range(psi0.size):
-        angle = psi0[j] + p.rotor[j, P.SPEED] * h * (number + ahead)
-        psi[j] = angle - 2.0 * math.pi * np.floor(angle * (0.5 / math.pi))
-
-
-@kernel
-def _freeze_forcing(p, x, stage, first, slope):
+def freeze_forcing(switches, rotors, state, stage, first, slope):
     """Rotor accelerations of the paper's Figure 3: only K1 q' + K0 q follow the stage.
 
     The coupling and forcing terms C1, C0, E of eqs. [13] and [14] keep their values of the previous time step,
     that is, what is left of its accelerations without the turning of the coordinates.
     """
-    n = p.first_blade[-1]
-    for block in (0, 2):  # flap, lag
-        angles, rates = S.BODY_SIZE + block * n, S.BODY_SIZE + (block + 1) * n
-        for i in range(n):
-            slope[rates + i] = first[rates + i]
-        if block == 2 and p.switches[P.LEAD_LAG] == 0:
-            continue
-        for j in range(p.rotor.shape[0]):
-            at = p.first_blade[j]
-            n_blades = p.first_blade[j + 1] - at
-            omega = p.rotor[j, P.SPEED]
-            add_rotation_terms(x, slope, angles + at, rates + at, n_blades, omega, -1.0)
-            add_rotation_terms(stage, slope, angles + at, rates + at, n_blades, omega, 1.0)
+    for j in range(rotors.shape[0]):
+        rotor = rotors[j]
+        for i in range(rotor.blades):
+            slope[rotor.flap_rate + i] = first[rotor.flap_rate + i]
+            slope[rotor.lag_rate + i] = first[rotor.lag_rate + i]
+        lags = 1.0 * switches.lead_lag
+        add_rotation_terms(rotor, state, slope, rotor.flap, rotor.flap_rate, -1.0)
+        add_rotation_terms(rotor, stage, slope, rotor.flap, rotor.flap_rate, 1.0)
+        add_rotation_terms(rotor, state, slope, rotor.lag, rotor.lag_rate, -lags)
+        add_rotation_terms(rotor, stage, slope, rotor.lag, rotor.lag_rate, lags)
 
 
 @kernel
-def _first_implausible(p, x, bounds):
-    """Index of the first state that is not finite or beyond its bound, `size` for the ground, -1 if there is none."""
-    for i in range(x.size):
-        if not abs(x[i]) <= bounds[i]:
-            return i
-    ground = bounds[x.size]
-    return x.size if ground < math.inf and lowest(p, x) >= ground else -1
+def all_plausible(model, x, bounds, culprit):
+    """True if all flights go on and no state is beyond its bound, or not a number, and nobody touches the ground."""
+    for lane in range(culprit.size):
+        if culprit[lane] != FLYING:
+            return False
+    rotors = as_records(model.rotors)
+    state, bound = as_lanes(x, rotors), as_lanes(bounds, rotors)
+    fine = abs(state[0]) <= bound[0]
+    for i in range(1, x.shape[0]):
+        fine = fine & (abs(state[i]) <= bound[i])
+    ground = bound[x.shape[0]]
+    if any_lane(ground < math.inf):
+        fine = fine & (lowest(rotors, state) < ground)
+    return all_lanes(fine)
+
+
+@kernel
+def take_lanes(model, x, tick, bounds, step, done, culprit):
+    """Take over the new states of the flights that go on, and say why others do not; False if none goes on."""
+    size, flying = x.shape[0], False
+    rotors = as_records(model.rotors)
+    deepest = as_lanes(tick.deepest, rotors)
+    deepest[0] = lowest(rotors, as_lanes(tick.stage, rotors))
+    for lane in range(culprit.size):
+        if culprit[lane] != FLYING:
+            continue
+        for i in range(size):
+            if not abs(tick.stage[i, lane]) <= bounds[i, lane]:
+                culprit[lane] = i
+                break
+        if culprit[lane] == FLYING and tick.deepest[0, lane] >= bounds[size, lane]:
+            culprit[lane] = size
+        if culprit[lane] == FLYING:
+            flying = True
+            done[lane] = step + 1
+            for i in range(size):
+                x[i, lane] = tick.stage[i, lane]
+        else:
+            for i in range(size):
+                tick.last[i, lane] = tick.stage[i, lane]
+    return flying

@@ -18,38 +18,36 @@ from numba.types import WrapperAddressProtocol
 from sbs_sim.interruption import raised_outside
 from sbs_sim.model.kernel_cache import cache_folder
 
-# Everything that `fastmath` means except "there is no NaN" and "there is no infinity": the checks that
-# keep such numbers out of the state must survive the optimiser.
-FASTMATH = {"reassoc", "contract", "arcp", "nsz", "afn"}
 # Without numba's reference counting (`_nrt`) a kernel that allocates does not compile, and every look at a row of an
 # array saves two atomic operations: a third of the time of a derivative.
-OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FASTMATH, "_nrt": False}
+OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a piece of the model; it is inlined where it is called and leaves nothing on disk."""
-    return _interruptible(numba.njit(forceinline=True, **OPTIONS)(function))
+    if numba.config.DISABLE_JIT:
+        return function
+    compiled = numba.njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)(function)
+    # without a wrapper there is nothing that Python could call: numba is to hand it nothing
+    compiled.add_overload = lambda made: compiled.overloads.update({tuple(made.signature.args): made})
+
+    def refuse(*_: Any, **__: Any) -> None:
+        raise TypeError(f"{function.__qualname__} is for compiled code: call it from a function that numba compiles")
+
+    compiled._compile_for_args = refuse
+    return compiled
 
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk."""
-    return _kept(function, OPTIONS)
-
-
-def exact_entry(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile an `entry` that does every operation as it is written: for what must not hang on where a loop ends."""
-    return _kept(function, {**OPTIONS, "fastmath": False})
-
-
-def _kept(function: Callable[..., Any], options: dict[str, Any]) -> Callable[..., Any]:
     # numba names caches after the path of the source, and colcon's symlink install gives one file two paths
     real = os.path.realpath(function.__code__.co_filename)
     function.__code__ = function.__code__.replace(co_filename=real)
     folder = cache_folder()
     if folder is None:
-        return _interruptible(numba.njit(**options)(function))
+        return _interruptible(numba.njit(**OPTIONS)(function))
     with _cache_in(folder):
-        return _interruptible(numba.njit(cache=True, **options)(function))
+        return _interruptible(numba.njit(cache=True, **OPTIONS)(function))
 
 
 def _interruptible(dispatcher: Any) -> Any:
@@ -94,6 +92,16 @@ class Address(WrapperAddressProtocol):
 def address(function: Any, *arguments: Any) -> Any:
     """`Address` of an entry; the entry itself where numba compiles nothing (NUMBA_DISABLE_JIT)."""
     return function if numba.config.DISABLE_JIT else Address(function, *arguments)
+
+
+def target_features() -> set[str]:
+    """Features of the processor that is compiled for, which the environment may set (NUMBA_CPU_FEATURES)."""
+    if numba.config.DISABLE_JIT:
+        return set()
+    from numba.core.registry import cpu_target
+
+    _, _, features = cpu_target.target_context.codegen().magic_tuple()
+    return {feature[1:] for feature in features.split(",") if feature.startswith("+")}
 
 
 @contextlib.contextmanager

@@ -148,8 +148,8 @@ def _words(path: Path, strange: set[str]) -> str:
 
 
 def source_digest() -> str:
-    """Digest of all sources of the compiled model, 16 hexadecimal digits."""
-    return digest_of(HERE.glob("*.py"))
+    """Digest of all sources of the compiled model and of its lanes, 16 hexadecimal digits."""
+    return digest_of([*HERE.glob("*.py"), *(HERE.parent / "lanes").glob("*.py")])
 
 
 def digest_of(files: Iterable[Path]) -> str:

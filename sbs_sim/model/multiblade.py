@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.model import params as P
+from sbs_sim.lanes import add_to_quads, spread
 from sbs_sim.model.kernel import kernel
 
-LANES = P.LANES
 Array = NDArray[np.float64]
 
 
@@ -43,81 +42,86 @@ def blade_matrix(blades: int, azimuth: float | Array, order: int = 0) -> Array:
 
 
 @kernel
-def blade_angle(x, angles, rates, n_blades, blade, cosine, sine, speed):
-    """Angle [rad] and rate [rad/s] of one blade from the coordinates of its rotor.
+def blade_angle(x, angles, rates, blade, cosine, sine):
+    """Angle [rad] and rate [rad/s] of blades from the coordinates of their rotors, eqs. (1.6) and (1.10).
 
-    `angles` and `rates` are the places of the first coordinate and its rate in the state x; cosine and sine are
-    those of the blade's azimuth, which grows at `speed` [rad/s].
+    Parameters
+    ----------
+    x : lanes, shape (size + 1,)
+        State, and a zero.
+    angles, rates : ndarray of int64, shape (coordinates, quads)
+        See `sbs_sim.model.records.Places`.
+    blade : record BLADE
+    cosine, sine : lanes
+        Of the azimuths of the blades.
     """
-    angle = x[angles]
-    rate = x[rates]
+    quad, last = blade.quad, angles.shape[0] - 1
+    angle, rate = spread(x, angles[0], quad, blade), spread(x, rates[0], quad, blade)
     cn, sn = cosine, sine
-    for n in range(1, (n_blades - 1) // 2 + 1):
-        i = 2 * n - 1
-        a, b = x[angles + i], x[angles + i + 1]
-        angle -= a * cn + b * sn
-        rate += n * speed * (a * sn - b * cn) - x[rates + i] * cn - x[rates + i + 1] * sn
+    for n in range(1, blade.harmonics + 1):
+        a, b = spread(x, angles[2 * n - 1], quad, blade), spread(x, angles[2 * n], quad, blade)
+        a_rate, b_rate = spread(x, rates[2 * n - 1], quad, blade), spread(x, rates[2 * n], quad, blade)
+        angle = angle - a * cn - b * sn
+        rate = rate + n * blade.speed * (a * sn - b * cn) - a_rate * cn - b_rate * sn
         cn, sn = cn * cosine - sn * sine, sn * cosine + cn * sine
-    if n_blades % 2 == 0:
-        sign = 1.0 - 2.0 * (blade % 2)
-        angle += sign * x[angles + n_blades - 1]
-        rate += sign * x[rates + n_blades - 1]
-    return angle, rate
+    return (
+        angle + blade.alternation * spread(x, angles[last], quad, blade),
+        rate + blade.alternation * spread(x, rates[last], quad, blade),
+    )
 
 
 @kernel
-def add_block_accelerations(dx, flap_rates, lag_rates, n_blades, row, share):
-    """Add what the blades of one block give to the accelerations of their rotor's coordinates.
-
-    `flap_rates` and `lag_rates` are the places of the first of them in dx; row: the block's in `Work.blade`; share: 1
-    over the number of blades.
-    """
-    flap, lag = _sums(row, P.IS_BLADE)
-    dx[flap_rates] += share * flap
-    dx[lag_rates] += share * lag
-    for i in range(LANES):
-        row[P.COS_N + i], row[P.SIN_N + i] = row[P.COSINE + i], row[P.SINE + i]
-    harmonics = (n_blades - 1) // 2
-    for n in range(1, harmonics + 1):
-        flap, lag = _sums(row, P.COS_N)
-        dx[flap_rates + 2 * n - 1] -= 2.0 * share * flap
-        dx[lag_rates + 2 * n - 1] -= 2.0 * share * lag
-        flap, lag = _sums(row, P.SIN_N)
-        dx[flap_rates + 2 * n] -= 2.0 * share * flap
-        dx[lag_rates + 2 * n] -= 2.0 * share * lag
-        if n < harmonics:
-            _next_harmonic(row)
-    if n_blades % 2 == 0:
-        for i in range(LANES):
-            sign = share * row[P.IS_BLADE + i] * (1.0 - 2.0 * (i % 2))
-            dx[flap_rates + n_blades - 1] += sign * row[P.FLAP_ACCELERATION + i]
-            dx[lag_rates + n_blades - 1] += sign * row[P.LAG_ACCELERATION + i]
+def add_accelerations(blade, terms, means, harmonics):
+    """Add the accelerations of blades to the sums over their quads that the means of eq. (1.9) are made of."""
+    flap, lag = terms.flap_acceleration, terms.lag_acceleration
+    add_to_quads(
+        means, blade.quad, blade.begins, "flap", (flap, lag, flap * blade.alternation, lag * blade.alternation)
+    )
+    cosine, sine = terms.cosine, terms.sine
+    cn, sn = cosine, sine
+    for n in range(1, blade.harmonics + 1):
+        add_to_quads(
+            harmonics[n - 1], blade.quad, blade.begins, "flap_cosine", (flap * cn, flap * sn, lag * cn, lag * sn)
+        )
+        cn, sn = cn * cosine - sn * sine, sn * cosine + cn * sine
 
 
 @kernel
-def _sums(row, weights):
-    """Flap and lag accelerations of the blades of a block, each times a weight that stands in a row."""
-    flap = lag = 0.0
-    for i in range(LANES):
-        flap += row[weights + i] * row[P.FLAP_ACCELERATION + i]
-        lag += row[weights + i] * row[P.LAG_ACCELERATION + i]
-    return flap, lag
-
-
-@kernel
-def _next_harmonic(row):
-    """Turn the cosine and sine of n psi into those of (n + 1) psi."""
-    for i in range(LANES):
-        c, s = row[P.COS_N + i], row[P.SIN_N + i]
-        row[P.COS_N + i] = c * row[P.COSINE + i] - s * row[P.SINE + i]
-        row[P.SIN_N + i] = s * row[P.COSINE + i] + c * row[P.SINE + i]
-
-
-@kernel
-def add_rotation_terms(x, dx, angles, rates, n_blades, speed, factor):
-    """Add `factor` times -K1 q' - K0 q (paper eqs. [26], [27]): what the turning of the coordinates gives."""
-    for n in range(1, (n_blades - 1) // 2 + 1):
+def set_accelerations(rotor, means, harmonics, dx):
+    """Accelerations of the coordinates of a rotor without what their turning gives, eq. (1.9)."""
+    share = rotor.inverse_blades
+    flap = lag = flap_differential = lag_differential = 0.0
+    for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
+        own = means[quad]
+        flap, lag = flap + own.flap, lag + own.lag
+        flap_differential = flap_differential + own.flap_differential
+        lag_differential = lag_differential + own.lag_differential
+    dx[rotor.flap_rate], dx[rotor.lag_rate] = share * flap, share * lag
+    last = rotor.blades - 1
+    if rotor.blades % 2 == 0:
+        dx[rotor.flap_rate + last], dx[rotor.lag_rate + last] = share * flap_differential, share * lag_differential
+    twice = -2.0 * share
+    for n in range(1, rotor.harmonics + 1):
+        flap_cosine = flap_sine = lag_cosine = lag_sine = 0.0
+        for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
+            part = harmonics[n - 1, quad]
+            flap_cosine, flap_sine = flap_cosine + part.flap_cosine, flap_sine + part.flap_sine
+            lag_cosine, lag_sine = lag_cosine + part.lag_cosine, lag_sine + part.lag_sine
         i = 2 * n - 1
-        harmonic = n * speed
-        dx[rates + i] += factor * harmonic * (harmonic * x[angles + i] - 2.0 * x[rates + i + 1])
-        dx[rates + i + 1] += factor * harmonic * (harmonic * x[angles + i + 1] + 2.0 * x[rates + i])
+        dx[rotor.flap_rate + i], dx[rotor.flap_rate + i + 1] = twice * flap_cosine, twice * flap_sine
+        dx[rotor.lag_rate + i], dx[rotor.lag_rate + i + 1] = twice * lag_cosine, twice * lag_sine
+
+
+@kernel
+def add_rotation_terms(rotor, x, dx, angles, rates, factor):
+    """Add `factor` times -K1 q' - K0 q (paper eqs. [26], [27]): what the turning of the coordinates gives.
+
+    `angles` and `rates` are the places of the first coordinate and its rate.
+    """
+    for n in range(1, rotor.harmonics + 1):
+        i = 2 * n - 1
+        harmonic = n * rotor.speed
+        a, b = x[angles + i], x[angles + i + 1]
+        a_rate, b_rate = x[rates + i], x[rates + i + 1]
+        dx[rates + i] = dx[rates + i] + factor * harmonic * (harmonic * a - 2.0 * b_rate)
+        dx[rates + i + 1] = dx[rates + i + 1] + factor * harmonic * (harmonic * b + 2.0 * a_rate)

@@ -1,142 +1,107 @@
-"""Blade elements: flow, coefficients and forces of the sections of up to four blades at once (theory.md section 4).
+"""Blade elements: flow, coefficients and forces of sections (theory.md section 4)."""
 
-The elements go by in chunks, each in passes over the rows of `Work.strip`: arithmetic that the compiler turns into
-vector instructions, look-ups that it cannot, and arithmetic again. The rows lie at constant places of one array, so
-that the compiler sees that they do not overlap.
-"""
+from typing import Any, NamedTuple
 
-import math
-
-import numpy as np
-
-from sbs_sim.model import params as P
-from sbs_sim.model.airfoil import cell_of, clamp, coefficients_in
+from sbs_sim.lanes import floor, greatest, least, select, table_row, zeros_like
 from sbs_sim.model.kernel import kernel
-from sbs_sim.model.trigonometry import arctangent2
+from sbs_sim.model.trigonometry import TINY, angle_of, inverse_root
 
-CHUNK, GROUP = P.CHUNK, P.KNOT_GROUP
-SPEED, REYNOLDS, ALPHA, RE, LIFT, DRAG = (CHUNK * row for row in range(P.STRIP_ROWS))
+DEGREE = 3  # of the interpolation along the angle
+
+
+class SectionFlow(NamedTuple):
+    """Velocities of the sections in the air: u_T = t0 + t1 s along the motion, u_P = p0 + p1 s along n [m/s]."""
+
+    t0: Any
+    t1: Any
+    p0: Any
+    p1: Any
+
+
+class AirLoads(NamedTuple):
+    """Sums along a blade: forces along n (up) and t (forward) [N], their first moments about the flap hinge [N m]."""
+
+    normal: Any
+    forward: Any
+    normal_moment: Any
+    forward_moment: Any
 
 
 @kernel
-def section_loads(p, j, row, blades, strip, cell):
-    """Sums of the aerodynamic forces along the blades of one block of rotor j.
+def section_loads(air, blade, elements, knots, table, strip, flow, pitch):
+    """Air loads of blades.
 
-    The velocities relative to the air are linear in the distance s from the flap hinge: u_T = UT0 + UT1 s along the
-    motion, u_P = UP0 + UP1 s along the blade's normal n [m/s]; PITCH is the angle of the blade's root [rad]. Outputs
-    are FORCE_N, FORCE_T [N] and the first moments about the flap hinge MOMENT_N, MOMENT_T [N m], n up and t forward.
+    The elements go by twice, so that both passes fit into the registers.
 
     Parameters
     ----------
-    p : Params
-    j : int
-    row : ndarray, shape (BLADE_SIZE,)
-        One block of `Work.blade`.
-    blades : int
-        Blades in this block.
-    strip, cell : ndarray
-        `Work.strip` and `Work.cell`.
+    air, blade : records AIR, BLADE
+    elements : records ELEMENT, shape (elements,)
+    knots : lanes, shape (knots,)
+        Reynolds numbers of the airfoil table.
+    table : ndarray, shape (cells, 16)
+    strip : records STRIP, shape (elements,)
+        Memory.
+    flow : SectionFlow
+    pitch : lanes
+        Angle of the blade's root [rad].
+
+    Returns
+    -------
+    AirLoads
     """
-    for i in range(blades):
-        row[P.FORCE_N + i] = row[P.FORCE_T + i] = row[P.MOMENT_N + i] = row[P.MOMENT_T + i] = 0.0
-    elements = p.grid_index[j, 3]
-    for chunk in range(p.element.shape[1]):
-        count = min(CHUNK, elements - chunk * CHUNK)
-        for i in range(blades):
-            _flow(p, j, p.element[j, chunk], row, i, strip[i], count)
-        for i in range(blades):
-            _cells(p, j, strip[i], cell[i], count)
-        for i in range(blades):
-            _coefficients(p.cells, strip[i], cell[i], count)
-        for i in range(blades):
-            _forces(p.air[P.DENSITY], p.element[j, chunk], row, i, strip[i], count)
+    for i in range(elements.shape[0]):
+        _look_up(air, blade, elements[i], knots, strip[i], flow, pitch)
+    normal = forward = normal_moment = forward_moment = zeros_like(pitch)
+    for i in range(elements.shape[0]):
+        element, found = elements[i], strip[i]
+        s = element.span
+        ut = flow.t0 + flow.t1 * s
+        up = flow.p0 + flow.p1 * s
+        lift, lift_slope, drag, drag_slope = table_row(table, found.row, found.fraction, DEGREE)
+        scale = (air.density * element.half_area) * found.speed
+        cl = (lift + lift_slope * found.reynolds) * (scale * element.lift_share)
+        cd = (drag + drag_slope * found.reynolds) * scale
+        dn = cl * ut - cd * up
+        dt = cl * up + cd * ut
+        normal = normal + dn
+        forward = forward - dt
+        normal_moment = normal_moment + s * dn
+        forward_moment = forward_moment - s * dt
+    return AirLoads(normal, forward, normal_moment, forward_moment)
 
 
 @kernel
-def _flow(p, j, element, row, lane, strip, count):
-    """Speed, Reynolds number, and place in the airfoil table along the angle, in cells, of the elements of a blade."""
-    inverse_viscosity, largest = p.air[P.INVERSE_VISCOSITY], 1.0 * p.grid_index[j, 1]
-    alpha0, inverse_step = p.grid[j, 0], p.grid[j, 1]
-    ut0, ut1, up0, up1 = row[P.UT0 + lane], row[P.UT1 + lane], row[P.UP0 + lane], row[P.UP1 + lane]
-    pitch = row[P.PITCH + lane]
-    for i in range(count):
-        s = element[P.SPAN + i]
-        ut = ut0 + ut1 * s
-        up = up0 + up1 * s
-        speed = math.sqrt(ut * ut + up * up)
-        alpha = pitch + element[P.TWIST + i] - arctangent2(up, ut)
-        strip[SPEED + i] = speed
-        strip[REYNOLDS + i] = speed * element[P.CHORD + i] * inverse_viscosity
-        strip[ALPHA + i] = clamp((alpha - alpha0) * inverse_step, largest)
-        strip[RE + i] = 0.0
+def _look_up(air, blade, element, knots, found, flow, pitch):
+    """Speed, Reynolds number, and place in the airfoil table of one element."""
+    ut = flow.t0 + flow.t1 * element.span
+    up = flow.p0 + flow.p1 * element.span
+    squared = ut * ut + up * up + TINY
+    inverse_speed = inverse_root(squared)
+    speed = squared * inverse_speed
+    alpha = pitch + element.twist - angle_of(up, ut, inverse_speed)
+    place = table_place(blade, knots, speed * (element.chord * air.inverse_viscosity), alpha)
+    found.speed, found.reynolds, found.fraction, found.row = speed, place.reynolds, place.fraction, place.row
+
+
+class TablePlace(NamedTuple):
+    """Row of a cell of the airfoil table, fraction of the way through it along the angle, Reynolds number."""
+
+    row: Any
+    fraction: Any
+    reynolds: Any
 
 
 @kernel
-def _cells(p, j, strip, cell, count):
-    """Cell of the airfoil table of every element, and its place within."""
-    first, n_alpha, n_re = p.grid_index[j, 0], p.grid_index[j, 1], p.grid_index[j, 2]
-    half = (p.grid.shape[1] - 2) // 2
-    for k in range(0, n_re, GROUP):
-        w0, w1, w2, w3, w4, w5, w6, w7 = _eight(p.grid[j], 2 + k)
-        r0, r1, r2, r3, r4, r5, r6, r7 = _eight(p.grid[j], 2 + half + k)
-        for i in range(count):
-            reynolds = strip[REYNOLDS + i]
-            low = clamp(reynolds * w0 - r0, 1.0) + clamp(reynolds * w1 - r1, 1.0)
-            low += clamp(reynolds * w2 - r2, 1.0) + clamp(reynolds * w3 - r3, 1.0)
-            high = clamp(reynolds * w4 - r4, 1.0) + clamp(reynolds * w5 - r5, 1.0)
-            high += clamp(reynolds * w6 - r6, 1.0) + clamp(reynolds * w7 - r7, 1.0)
-            strip[RE + i] += low + high
-    rows, columns = 1.0 * n_re, 1.0 * n_alpha
-    for i in range(count):
-        along_re, along_alpha = cell_of(strip[RE + i], rows), cell_of(strip[ALPHA + i], columns)
-        strip[RE + i] -= along_re
-        strip[ALPHA + i] -= along_alpha
-        cell[i] = np.int32(first + along_re * columns + along_alpha)
-
-
-@kernel
-def _eight(values, at):
-    """Numbers in a row: loads that the compiler need not repeat."""
-    return (
-        values[at],
-        values[at + 1],
-        values[at + 2],
-        values[at + 3],
-        values[at + 4],
-        values[at + 5],
-        values[at + 6],
-        values[at + 7],
-    )
-
-
-@kernel
-def _coefficients(cells, strip, cell, count):
-    """Lift and drag coefficient of every element."""
-    for i in range(count):
-        cl, cd = coefficients_in(cells, np.uintp(cell[i]), strip[ALPHA + i], strip[RE + i])
-        strip[LIFT + i] = cl
-        strip[DRAG + i] = cd
-
-
-@kernel
-def _forces(density, element, row, lane, strip, count):
-    """Add the forces and first moments of a chunk of a blade's elements."""
-    ut0, ut1, up0, up1 = row[P.UT0 + lane], row[P.UT1 + lane], row[P.UP0 + lane], row[P.UP1 + lane]
-    fn = ft = mn = mt = 0.0
-    for i in range(count):
-        s = element[P.SPAN + i]
-        ut = ut0 + ut1 * s
-        up = up0 + up1 * s
-        cl = strip[LIFT + i] * element[P.LIFT_FRACTION + i]
-        cd = strip[DRAG + i]
-        scale = density * element[P.HALF_AREA + i] * strip[SPEED + i]
-        dn = scale * (cl * ut - cd * up)
-        dt = -scale * (cl * up + cd * ut)
-        fn += dn
-        ft += dt
-        mn += s * dn
-        mt += s * dt
-    row[P.FORCE_N + lane] += fn
-    row[P.FORCE_T + lane] += ft
-    row[P.MOMENT_N + lane] += mn
-    row[P.MOMENT_T + lane] += mt
+def table_place(blade, knots, reynolds, alpha):
+    """Place of a Reynolds number and an angle of attack [rad] in the table; a cell of it, whatever they are."""
+    reynolds = least(greatest(reynolds, blade.least_reynolds), blade.largest_reynolds)
+    along = (alpha - blade.first_angle) * blade.inverse_step
+    columns = blade.columns
+    along = select(along < 0.0, 0.0, along)
+    along = select(along > columns, columns, along)  # NaN stays NaN ...
+    column = select(along < columns, floor(along), columns - 1.0)  # ... in a cell of the table
+    row = blade.first_row + column
+    for k in range(knots.shape[0]):
+        row = row + select(reynolds >= knots[k], columns, 0.0)
+    return TablePlace(row, along - column, reynolds)

@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 
 from sbs_sim import checks
 from sbs_sim.errors import SimulationError
-from sbs_sim.model.kernel import exact_entry, kernel
+from sbs_sim.lanes import any_lane, as_lanes, as_records, select, zeros_like
+from sbs_sim.model.elementary import cosine_and_sine, exponential, exponential_less_one
+from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.noise import normal
+from sbs_sim.model.trigonometry import TURN, cosine_sine
 
 Array = NDArray[np.float64]
 
@@ -37,14 +41,35 @@ def wind_at(wind, time, fraction, out):
 
     The gust is peak / 2 (1 - cos(2 pi (t - start) / duration)) (EASA CS-25.341 with time in place of distance).
     """
-    share = 0.0
-    since = time - wind[GUST_START]
-    duration = wind[GUST_DURATION]
-    if duration > 0.0 and 0.0 <= since <= duration:
-        share = 0.5 * (1.0 - math.cos(2.0 * math.pi * since / duration))
+    since, duration = time - wind[GUST_START], wind[GUST_DURATION]
+    blowing = (duration > 0.0) & (since >= 0.0) & (since <= duration)
+    share = zeros_like(since)
+    if any_lane(blowing):
+        cosine, _ = cosine_sine(TURN * since / select(blowing, duration, 1.0))
+        share = select(blowing, 0.5 - 0.5 * cosine, 0.0)
     for i in range(3):
         start, end = wind[TURBULENCE_FROM + i], wind[TURBULENCE_TO + i]
         out[i] = wind[STEADY + i] + share * wind[GUST + i] + start + fraction * (end - start)
+
+
+@entry
+def winds_at(winds, times, like, out):
+    """What `wind_at` gives at the beginnings of ticks.
+
+    Parameters
+    ----------
+    winds : ndarray, shape (m, WIND_SIZE, n)
+    times : ndarray, shape (m,)
+        [s]
+    like : structured ndarray
+        Records of n lanes.
+    out : ndarray, shape (m, 3, n)
+        Output, NED [m/s].
+    """
+    records = as_records(like)
+    air, velocities = as_lanes(winds, records), as_lanes(out, records)
+    for i in range(times.size):
+        wind_at(air[i], times[i], 0.0, velocities[i])
 
 
 @dataclass(frozen=True)
@@ -172,26 +197,26 @@ class DrydenTurbulence:
 
     def __init__(self, wind: Wind, tick: float) -> None:
         ratio = tick * wind.turbulence_airspeed / wind.turbulence_length
-        self._random = np.random.Generator(np.random.PCG64(wind.turbulence_seed))
-        decay = math.exp(-ratio)
+        self._noise = np.random.PCG64(wind.turbulence_seed)
+        decay = exponential(-ratio)
         spread = math.sqrt(0.5 * (1.0 - decay * decay))
-        direction = (math.cos(wind.turbulence_direction), math.sin(wind.turbulence_direction))
+        direction = cosine_and_sine(wind.turbulence_direction)
         sigma = (float(value) for value in wind.turbulence_intensity)
         self._filter = (decay, ratio, spread, *_noise_of_step(ratio), *direction, *sigma)
         # The field is already there when the flight begins: start from its stationary distribution. In units of T,
         # z1' = -z1 + n and z2' = -z2 + z1 have the covariance (1/2, 1/4; 1/4, 1/4).
-        first = self._random.standard_normal((2, 2))
+        along, *first = normal(self._noise, 3)
         z1, z2 = math.sqrt(0.5) * first[0], math.sqrt(0.125) * (first[0] + first[1])
-        self._states = np.array([math.sqrt(0.5) * self._random.standard_normal(), *z1, *z2])
+        self._states = np.array([math.sqrt(0.5) * along[0], *z1, *z2])
 
     def advance(self, count: int) -> Array:
         """Go on by some ticks; velocity of the air now and after each of them, NED [m/s], shape (count + 1, 3)."""
         velocities = np.empty((count + 1, 3))
-        _filtered(self._filter, self._random.standard_normal((count, 2, 3)), self._states, velocities)
+        _filtered(self._filter, normal(self._noise, 3 * count).reshape(-1, 2, 3), self._states, velocities)
         return velocities
 
 
-@exact_entry
+@entry
 def _filtered(constants, noise, states, velocities):
     """Filter the noise of `DrydenTurbulence.advance`, which goes on from `states` and changes them.
 
@@ -225,8 +250,8 @@ def _noise_of_step(ratio: float) -> tuple[float, float, float]:
     That is the integral of exp(-2 s) (1, s; s, s^2) over the step. For a short step the last diagonal element is
     lost in rounding; zero stands for it then.
     """
-    decay = math.exp(-2.0 * ratio)
-    first = -math.expm1(-2.0 * ratio) / 2.0
+    decay = exponential(-2.0 * ratio)
+    first = -exponential_less_one(-2.0 * ratio) / 2.0
     mixed = (1.0 - decay * (1.0 + 2.0 * ratio)) / 4.0
     second = (1.0 - decay * (1.0 + 2.0 * ratio + 2.0 * ratio**2)) / 4.0
     rest = max(0.0, second - mixed**2 / first)

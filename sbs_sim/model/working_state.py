@@ -1,86 +1,97 @@
 """What each rotor is made to do: how far it is from what the model describes (theory.md section 6.1)."""
 
-import math
-
-from sbs_sim.model import params as P
-from sbs_sim.model import state as S
+from sbs_sim.lanes import (
+    Vector,
+    add_to_quads,
+    as_lanes,
+    greatest,
+    least,
+    select,
+    sqrt,
+    zeros_like,
+)
+from sbs_sim.model.dynamics import in_lanes, memory_in_lanes
 from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.trigonometry import TINY, angle_of, inverse_root
 
 # columns of a rotor's row
 ADVANCE_RATIO, HOVER_INFLOW, DESCENT, FLOW, STALLED, REVERSED, OUTSIDE = range(7)
 WORKING_SIZE = 7
 
-# rows of a rotor's stall angles
+# rows of the stall angles
 REYNOLDS, HIGHEST, LOWEST = range(3)
 
 
 @entry
-def working_state(p, x, stall, work, out):
+def working_state(model, work, out):
     """Working state of every rotor at the instant of the last `derivative`.
 
     Parameters
     ----------
-    p : Params
-    x : ndarray, shape (size,)
-        Simulation state that the derivative was asked for.
-    stall : ndarray, shape (n_rotors, 3, n)
-        Reynolds numbers, increasing, and the highest and lowest angle of attack [rad] at which the rotor's airfoil is
-        not stalled; filled up with copies of the last.
+    model : Model
     work : Work
         As the derivative left it.
-    out : ndarray, shape (n_rotors, WORKING_SIZE)
+    out : ndarray, shape (n_rotors, WORKING_SIZE, n)
         Output: advance ratio; hover inflow ratio of the present thrust, a_w sqrt(2 |C_T|); velocity of the hub against
         the thrust and flow through the disc with it, both over the tip speed; shares of the disc, between flap hinge
         and tip, where sections are stalled, where the flow comes from behind, and where the Reynolds number is outside
         of the airfoil's table, as the blades meet it now.
     """
-    for j in range(p.rotor.shape[0]):
-        rotor, row = p.rotor[j], out[j]
-        scale = rotor[P.INVERSE_TIP_SPEED]
-        sense = 1.0 if work.aero[j, 0] >= 0.0 else -1.0  # upside down, all that follows is
-        mu_z = work.hub_flow[j, 2] * scale
-        row[ADVANCE_RATIO] = math.hypot(work.hub_flow[j, 0], work.hub_flow[j, 1]) * scale
-        row[HOVER_INFLOW] = rotor[P.DUCT] * math.sqrt(2.0 * abs(work.aero[j, 0]) * rotor[P.LOAD_SCALE])
-        row[DESCENT] = sense * mu_z
-        row[FLOW] = sense * (x[S.BODY_SIZE + 4 * p.first_blade[-1] + 3 * j] - mu_z)
-        row[STALLED], row[REVERSED], row[OUTSIDE] = _shares(p, j, stall[j], work)
+    aircraft, memory = in_lanes(model), memory_in_lanes(work)
+    angles, rows = as_lanes(model.stall, aircraft.blades), as_lanes(out, aircraft.rotors)
+    for r in range(aircraft.blades.shape[0]):
+        blade = aircraft.blades[r]
+        found = shares(aircraft, blade, memory.terms[r], angles[r])
+        add_to_quads(memory.hubs, blade.quad, blade.begins, "force", found)
+    for j in range(aircraft.rotors.shape[0]):
+        rotor, row, flow = aircraft.rotors[j], rows[j], memory.flow[j].velocity
+        thrust, scale = memory.totals[j].thrust, rotor.inverse_tip_speed
+        sense = select(thrust >= 0.0, 1.0, -1.0)  # upside down, all that follows is
+        through = flow.z * scale
+        row[ADVANCE_RATIO] = sqrt(flow.x * flow.x + flow.y * flow.y) * scale
+        row[HOVER_INFLOW] = rotor.duct * sqrt(2.0 * abs(thrust) * rotor.load_scale)
+        row[DESCENT] = sense * through
+        row[FLOW] = sense * (memory.state[rotor.inflow] - through)
+        found, area = Vector(0.0, 0.0, 0.0), zeros_like(scale)
+        for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
+            own = memory.hubs[quad]
+            found, area = found + own.force, area + own.moment.x
+        row[STALLED], row[REVERSED], row[OUTSIDE] = found.x / area, found.y / area, found.z / area
 
 
 @kernel
-def _shares(p, j, stall, work):
-    """Shares of the disc of rotor j that are stalled, in reverse flow, and outside of the table, by area."""
-    area = stalled = reversed_ = outside = 0.0
-    hinge = p.rotor[j, P.HINGE]
-    for blade in range(p.first_blade[j + 1] - p.first_blade[j]):
-        row, lane = work.blade[p.first_block[j] + blade // P.LANES], blade % P.LANES
-        ut0, ut1, up0, up1 = row[P.UT0 + lane], row[P.UT1 + lane], row[P.UP0 + lane], row[P.UP1 + lane]
-        for chunk in range(p.element.shape[1]):
-            element = p.element[j, chunk]
-            for i in range(min(P.CHUNK, p.grid_index[j, 3] - chunk * P.CHUNK)):
-                span, chord = element[P.SPAN + i], element[P.CHORD + i]
-                part = (hinge + span) * element[P.HALF_AREA + i] / chord
-                ut, up = ut0 + ut1 * span, up0 + up1 * span
-                area += part
-                reynolds = math.sqrt(ut * ut + up * up) * chord * p.air[P.INVERSE_VISCOSITY]
-                if not stall[REYNOLDS, 0] <= reynolds <= stall[REYNOLDS, -1]:
-                    outside += part
-                if ut <= 0.0:
-                    reversed_ += part
-                else:
-                    alpha = row[P.PITCH + lane] + element[P.TWIST + i] - math.atan2(up, ut)
-                    low = _between(stall[REYNOLDS], stall[LOWEST], reynolds)
-                    high = _between(stall[REYNOLDS], stall[HIGHEST], reynolds)
-                    if not low <= alpha <= high:
-                        stalled += part
-    return stalled / area, reversed_ / area, outside / area
+def shares(aircraft, blade, terms, angles):
+    """Of the disc that blades sweep, up to a common factor: stalled, in reverse flow, outside of the table, and all."""
+    air, elements = aircraft.air[0], aircraft.elements[blade.elements]
+    area = stalled = reversed_ = outside = zeros_like(terms.pitch)
+    for i in range(elements.shape[0]):
+        element = elements[i]
+        part = (blade.hinge + element.span) * element.half_area / element.chord
+        ut, up = terms.ut0 + terms.ut1 * element.span, terms.up0 + terms.up1 * element.span
+        squared = ut * ut + up * up + TINY
+        inverse_speed = inverse_root(squared)
+        alpha = terms.pitch + element.twist - angle_of(up, ut, inverse_speed)
+        reynolds = squared * inverse_speed * element.chord * air.inverse_viscosity
+        low, high = (
+            between(angles[REYNOLDS], angles[LOWEST], reynolds),
+            between(angles[REYNOLDS], angles[HIGHEST], reynolds),
+        )
+        backwards = ut <= 0.0
+        attached = (alpha >= low) & (alpha <= high)
+        area = area + part
+        reversed_ = reversed_ + select(backwards, part, 0.0)
+        stalled = stalled + select(backwards | attached, 0.0, part)
+        known = (reynolds >= blade.least_reynolds) & (reynolds <= blade.largest_reynolds)
+        outside = outside + select(known, 0.0, part)
+    return stalled, reversed_, outside, area
 
 
 @kernel
-def _between(places, values, place):
+def between(places, values, place):
     """Linear interpolation, constant beyond the ends."""
-    if place <= places[0]:
-        return values[0]
-    for i in range(1, places.size):
-        if place <= places[i]:
-            return values[i - 1] + (values[i] - values[i - 1]) * (place - places[i - 1]) / (places[i] - places[i - 1])
-    return values[-1]
+    found = values[0] + 0.0
+    for i in range(1, places.shape[0]):
+        width = places[i] - places[i - 1]
+        share = least(greatest((place - places[i - 1]) / select(width > 0.0, width, 1.0), 0.0), 1.0)
+        found = select(place > places[i - 1], values[i - 1] + share * (values[i] - values[i - 1]), found)
+    return found

@@ -39,10 +39,11 @@ from sbs_msgs.srv import SetWind
 from sbs_sim import validity
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import linearize, modes, sweep, trim
+from sbs_sim.engine import Engine
 from sbs_sim.errors import SimulationError
-from sbs_sim.model import params as P
+from sbs_sim.model import records as R
 from sbs_sim.model import state as S
-from sbs_sim.model.average import averaged_derivative
+from sbs_sim.model.average import azimuths
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.wind import LARGEST_WIND, Wind
 from sbs_sim.simulation import Event, Snapshot, blade_angles, trimmed_state
@@ -236,10 +237,10 @@ class StateMessages:
         rotor.flap_rate = _doubles(state[layout.flap_rate(j)])
         rotor.lag = _doubles(state[layout.lag(j)])
         rotor.lag_rate = _doubles(state[layout.lag_rate(j)])
-        rotor.thrust, rotor.torque = loads[P.THRUST], loads[P.TORQUE]
-        rotor.power = loads[P.TORQUE] * rotor.speed
-        _set_vector(rotor.hub.force, loads[P.FORCE : P.FORCE + 3])
-        _set_vector(rotor.hub.torque, loads[P.MOMENT : P.MOMENT + 3])
+        rotor.thrust, rotor.torque = loads[R.THRUST], loads[R.TORQUE]
+        rotor.power = loads[R.TORQUE] * rotor.speed
+        _set_vector(rotor.hub.force, loads[R.FORCE : R.FORCE + 3])
+        _set_vector(rotor.hub.torque, loads[R.MOMENT : R.MOMENT + 3])
 
     def _fill_odom(self, values: list[float]) -> None:
         """The same motion in ENU and FLU: x east, y north, z up; body x forward, y left, z up."""
@@ -296,14 +297,14 @@ def snapshot_of(
         raise SimulationError(f"the flight has rotors with {blades} blades, {aircraft.name} has {layout.blades}")
     state = np.empty(layout.size)
     state[: S.BODY_SIZE] = body_array(body)
-    loads = np.zeros((count, P.LOAD_SIZE))
+    loads = np.zeros((count, R.LOAD_SIZE))
     for j, rotor in enumerate(rotors.rotors):
         state[layout.flap(j)], state[layout.flap_rate(j)] = rotor.flap, rotor.flap_rate
         state[layout.lag(j)], state[layout.lag_rate(j)] = rotor.lag, rotor.lag_rate
         state[layout.inflow(j)] = inflow.rotors[j].uniform, inflow.rotors[j].sine, inflow.rotors[j].cosine
-        loads[j, P.THRUST], loads[j, P.TORQUE] = rotor.thrust, rotor.torque
-        loads[j, P.FORCE : P.FORCE + 3] = _triple(rotor.hub.force)
-        loads[j, P.MOMENT : P.MOMENT + 3] = _triple(rotor.hub.torque)
+        loads[j, R.THRUST], loads[j, R.TORQUE] = rotor.thrust, rotor.torque
+        loads[j, R.FORCE : R.FORCE + 3] = _triple(rotor.hub.force)
+        loads[j, R.MOMENT : R.MOMENT + 3] = _triple(rotor.hub.torque)
     acceleration = np.array(_triple(body.acceleration))
     azimuth = np.array([rotor.azimuth for rotor in rotors.rotors])
     for values in (state, acceleration, azimuth, loads):
@@ -371,10 +372,9 @@ def _condition_message(point: trim.TrimPoint) -> TrimCondition:
 def _mean_snapshot(aircraft: Aircraft, point: trim.TrimPoint) -> Snapshot:
     """Trim as the instant at which the first blades are aft, with the mean loads of a revolution."""
     count = len(aircraft.rotors)
-    params = aircraft.params(point.lead_lag, point.cyclic_inflow)
-    state, still_air, azimuths = trimmed_state(aircraft, point), np.zeros(3), point.azimuth_count
-    slope, loads = np.zeros_like(state), np.zeros((count, P.LOAD_SIZE))
-    averaged_derivative(params, state, point.swashplate, azimuths, still_air, P.make_work(params), slope, loads)
+    state = trimmed_state(aircraft, point)
+    engine = Engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
+    _, loads = engine.average(state, point.swashplate, azimuths(aircraft.layout.blades, point.azimuth_count))
     return Snapshot(
         step=0,
         time=0.0,
@@ -383,7 +383,7 @@ def _mean_snapshot(aircraft: Aircraft, point: trim.TrimPoint) -> Snapshot:
         swashplate=point.swashplate,
         azimuth=np.zeros(count),
         loads=loads,
-        wind=still_air,
+        wind=np.zeros(3),
     )
 
 

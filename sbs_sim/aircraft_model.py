@@ -1,0 +1,232 @@
+"""The compiled model's records of one aircraft, a single lane everywhere; `sbs_sim.model.packing` arranges them."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.model import records as R
+from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells
+from sbs_sim.model.elementary import cosine_and_sine
+from sbs_sim.model.frames import hub_axes
+
+if TYPE_CHECKING:
+    from sbs_sim.aircraft import Aircraft, Rotor
+
+Array = NDArray[np.float64]
+LEAST_DENSITY = 1e-12  # kg/m^3, less than at 300 km: a vacuum
+
+
+def model_of(aircraft: "Aircraft") -> R.Model:
+    """Records of an aircraft with lag and cyclic inflow (theory.md section 7)."""
+    airfoils = list(dict.fromkeys(aircraft.tables))
+    tables = [cells(airfoil, aircraft.options.interpolation) for airfoil in airfoils]
+    first_rows = dict(zip(airfoils, np.cumsum([0, *map(len, tables)])[:-1].tolist(), strict=True))
+    table = R.aligned((sum(map(len, tables)), tables[0].shape[1]), float)
+    table[:] = np.concatenate(tables)
+    most = max(len(airfoil.reynolds) for airfoil in airfoils) - 2
+    blades = R.records(R.BLADE, aircraft.layout.blade_count, 1)
+    knots = R.aligned((len(blades), most, 1), float)
+    quads = np.cumsum([0, *(-(-rotor.blades // R.QUAD) for rotor in aircraft.rotors)])
+    number = 0
+    for j, rotor in enumerate(aircraft.rotors):
+        airfoil = aircraft.tables[j]
+        for k in range(rotor.blades):
+            _set(blades[number], _blade_values(aircraft, rotor, k, airfoil, first_rows[airfoil]))
+            blades[number]["quad"], blades[number]["begins"] = quads[j] + k // R.QUAD, k % R.QUAD == 0
+            blades[number]["elements"], blades[number]["harmonics"] = j, (rotor.blades - 1) // 2
+            inner = airfoil.reynolds[1:-1]
+            knots[number, :, 0] = np.concatenate([inner, np.full(most - len(inner), np.inf)])
+            number += 1
+    return R.Model(
+        switches=_switches(aircraft),
+        air=_air(aircraft),
+        body=_body(aircraft),
+        rotors=_rotors(aircraft, quads),
+        blades=blades,
+        places=_places(aircraft, quads),
+        elements=_elements(aircraft),
+        knots=knots,
+        table=table,
+        stall=_stall(aircraft),
+    )
+
+
+def _stall(aircraft: "Aircraft") -> Array:
+    angles = aircraft.stall_table
+    stall = R.aligned((aircraft.layout.blade_count, *angles.shape[1:], 1), float)
+    stall[..., 0] = np.repeat(angles, [rotor.blades for rotor in aircraft.rotors], axis=0)
+    return stall
+
+
+def with_fidelity(model: R.Model, lead_lag: bool, cyclic_inflow: bool) -> R.Model:
+    """Model in which blades lag or not, and the inflow has its cyclic parts or not."""
+    switches, blades, places = model.switches.copy(), model.blades, model.places
+    switches["lead_lag"], switches["cyclic_inflow"] = lead_lag, cyclic_inflow
+    zero = R.state_size(model)  # its place behind the state
+    if not lead_lag:
+        blades = R.aligned(blades.shape, blades.dtype)
+        blades[:] = model.blades
+        blades["lead_lag"] = 0.0
+        places = places._replace(lag=np.full_like(places.lag, zero), lag_rate=np.full_like(places.lag_rate, zero))
+    if not cyclic_inflow:
+        places = places._replace(inflow=places.inflow.copy())
+        places.inflow[1:] = zero
+    return model._replace(switches=switches, blades=blades, places=places)
+
+
+def _set(record: Any, values: dict[str, Any]) -> None:
+    """Set fields of a record with a single lane."""
+    for name, value in values.items():
+        record[name][..., 0] = value
+
+
+def _switches(aircraft: "Aircraft") -> NDArray[Any]:
+    switches = R.records(R.SWITCHES, 1, 1)
+    switches["lead_lag"] = switches["cyclic_inflow"] = 1
+    switches["complete_coupling"] = aircraft.options.coupling == "complete"
+    switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
+    return switches
+
+
+def _air(aircraft: "Aircraft") -> NDArray[Any]:
+    air, environment = R.records(R.AIR, 1, 1), aircraft.environment
+    values = {
+        "density": environment.air_density,
+        "inverse_viscosity": 1.0 / environment.kinematic_viscosity,
+        "gravity": environment.gravity,
+        "plate_areas": aircraft.body.flat_plate_areas,
+    }
+    _set(air[0], values)
+    return air
+
+
+def _body(aircraft: "Aircraft") -> NDArray[Any]:
+    body = R.records(R.BODY, 1, 1)
+    complete = aircraft.options.coupling == "complete"
+    parts = aircraft.fuselage() if complete else (aircraft.body.mass, np.zeros(3), aircraft.body.inertia)
+    _set(body[0], dict(zip(("mass", "first_moment", "inertia"), parts, strict=True)))
+    return body
+
+
+def second_moment(aircraft: "Aircraft", rotor: "Rotor") -> float:
+    """A_1 in the equations of a blade [kg m^2]."""
+    whole = aircraft.options.flap_inertia == "axis_to_tip"
+    return rotor.blade_mass * rotor.radius**2 / 3 if whole else rotor.second_moment
+
+
+def _blade_values(
+    aircraft: "Aircraft", rotor: "Rotor", number: int, airfoil: AirfoilTable, first_row: int
+) -> dict[str, Any]:
+    """Values of a blade but for the whole numbers."""
+    columns, first_angle, inverse_step = cell_grid(airfoil)
+    cos_phase, sin_phase = cosine_and_sine(rotor.swashplate_phase)
+    cos_place, sin_place = cosine_and_sine(2.0 * math.pi * number / rotor.blades)
+    inertia = second_moment(aircraft, rotor)
+    return {
+        "speed": rotor.speed,
+        "sense": rotor.rotation,
+        "radius": rotor.radius,
+        "hub": rotor.hub,
+        "axes": hub_axes(rotor.shaft_direction),
+        "hinge": rotor.hinge_offset,
+        "lag_hinge": rotor.hinge_offset - rotor.flap_hinge_offset,
+        "flap_hinge": rotor.flap_hinge_offset,
+        "mass": rotor.blade_mass,
+        "first": rotor.first_moment,
+        "second": inertia,
+        "second_hub": rotor.second_moment,
+        "inverse_second": 1.0 / inertia,
+        "flap_spring": rotor.flap_spring,
+        "lag_spring": rotor.lag_spring,
+        "lag_damping": rotor.lag_damping,
+        "pitch_flap": rotor.pitch_flap_coupling,
+        "pitch_lag": rotor.pitch_lag_coupling,
+        "cos_phase": cos_phase,
+        "sin_phase": sin_phase,
+        "cos_place": cos_place,
+        "sin_place": sin_place,
+        "alternation": (1.0 - 2.0 * (number % 2)) if rotor.blades % 2 == 0 else 0.0,
+        "lead_lag": 1.0,
+        "first_angle": first_angle,
+        "inverse_step": inverse_step,
+        "columns": columns,
+        "first_row": first_row,
+        "least_reynolds": airfoil.reynolds[0],
+        "largest_reynolds": airfoil.reynolds[-1],
+    }
+
+
+def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
+    rotors, layout, density = (
+        R.records(R.ROTOR, len(aircraft.rotors), 1),
+        aircraft.layout,
+        aircraft.environment.air_density,
+    )
+    for j, rotor in enumerate(aircraft.rotors):
+        tip_speed = rotor.speed * rotor.radius
+        # in vacuum the coefficients are zero, not zero over zero
+        pressure = density * math.pi * rotor.radius**2 * tip_speed**2
+        values = {
+            "speed": rotor.speed,
+            "radius": rotor.radius,
+            "sense": rotor.rotation,
+            "hub": rotor.hub,
+            "axes": hub_axes(rotor.shaft_direction),
+            "duct": rotor.duct_expansion,
+            "inverse_tip_speed": 1.0 / tip_speed,
+            "load_scale": 1.0 / pressure if density > LEAST_DENSITY else 0.0,
+            "inverse_blades": 1.0 / rotor.blades,
+        }
+        _set(rotors[j], values)
+        whole = {
+            "blades": rotor.blades,
+            "harmonics": (rotor.blades - 1) // 2,
+            "first_quad": quads[j],
+            "quads": quads[j + 1] - quads[j],
+            "flap": layout.flap(j).start,
+            "flap_rate": layout.flap_rate(j).start,
+            "lag": layout.lag(j).start,
+            "lag_rate": layout.lag_rate(j).start,
+            "inflow": layout.inflow(j).start,
+        }
+        for name, value in whole.items():
+            rotors[j][name] = value
+    return rotors
+
+
+def _places(aircraft: "Aircraft", quads: NDArray[np.int64]) -> R.Places:
+    """See `Places`; the zero stands behind the state."""
+    layout, zero = aircraft.layout, aircraft.layout.size
+    harmonics = max((rotor.blades - 1) // 2 for rotor in aircraft.rotors)
+    number = np.concatenate([np.full(quads[j + 1] - quads[j], j) for j in range(len(aircraft.rotors))])
+    first = {
+        name: [getattr(layout, name)(j).start for j in number] for name in ("flap", "flap_rate", "lag", "lag_rate")
+    }
+    found = {}
+    for name, starts in first.items():
+        places = np.full((2 * harmonics + 2, len(number)), zero, dtype=np.int64)
+        for quad, (start, j) in enumerate(zip(starts, number, strict=True)):
+            blades = aircraft.rotors[j].blades
+            turning = 1 + 2 * ((blades - 1) // 2)
+            places[:turning, quad] = start + np.arange(turning)
+            if blades % 2 == 0:
+                places[-1, quad] = start + blades - 1
+        found[name] = places
+    inflow = np.array([layout.inflow(j).start for j in number])
+    return R.Places(
+        azimuth=number.astype(np.int64),
+        swash=(3 * number + np.arange(3)[:, None]).astype(np.int64),
+        inflow=(inflow + np.arange(3)[:, None]).astype(np.int64),
+        **found,
+    )
+
+
+def _elements(aircraft: "Aircraft") -> NDArray[Any]:
+    count = aircraft.options.elements
+    elements = R.records(R.ELEMENT, (len(aircraft.rotors), count), 1)
+    for j, rotor in enumerate(aircraft.rotors):
+        for name, values in zip(R.ELEMENT, rotor.elements(count), strict=True):
+            elements[name][j, :, 0] = values
+    return elements

@@ -1,0 +1,103 @@
+"""Compiled code at work: one flight with its blades in the lanes, or as many flights as there are lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.model import records as R
+from sbs_sim.model.average import averaged_derivative
+from sbs_sim.model.dynamics import derivative
+from sbs_sim.model.integrate import RK4, STAGES, advance
+from sbs_sim.model.kernel import address
+from sbs_sim.model.wind import WIND_SIZE
+from sbs_sim.model.working_state import WORKING_SIZE, working_state
+
+Array = NDArray[np.float64]
+
+
+class Code(NamedTuple):
+    """Machine code of the entries that other entries call, for one arrangement of lanes; whatever the aircraft."""
+
+    derivative: Any
+    advance: Any
+    working_state: Any
+
+
+class Engine:
+    """A model that is arranged for the processor, with the memory that it takes; for one thread.
+
+    Parameters
+    ----------
+    model : Model
+        As `Aircraft.arranged` gives it, or `side_by_side`.
+    method : int, optional
+        Of integration, see `sbs_sim.model.integrate`.
+
+    Attributes
+    ----------
+    work : Work
+    tick : Tick
+    n : int
+        Flights, or states of one aircraft, side by side.
+    size, rotors : int
+        Of the state, and of the aircraft.
+    """
+
+    def __init__(self, model: R.Model, method: int = RK4) -> None:
+        self.model, self.work = model, R.make_work(model)
+        self.tick = R.make_tick(self.work, int(STAGES[method]))
+        self.size, self.n = self.tick.stage.shape
+        self.rotors = len(self.tick.psi)
+
+    @property
+    def code(self) -> Code:
+        """Machine code, compiled when it is first asked for."""
+        arrangement = self.n, self.model.blades["speed"].shape[-1]
+        if arrangement not in _codes:
+            _codes[arrangement] = self._compiled()
+        return _codes[arrangement]
+
+    def _compiled(self) -> Code:
+        tick, swash = self.tick, self.memory(3 * self.rotors)
+        rates = address(derivative, self.model, tick.stage, swash, tick.psi, tick.wind, self.work, tick.slopes[0], True)
+        step = address(
+            advance,
+            *(rates, self.model, tick.stage, swash, tick.psi, 0, 1, 1.0, self.memory(WIND_SIZE), RK4),
+            *(self.memory(self.size + 1), self.work, tick, tick.done, np.zeros(self.n, dtype=np.int64)),
+        )
+        looks = address(working_state, self.model, self.work, self.memory(self.rotors, WORKING_SIZE))
+        return Code(rates, step, looks)
+
+    def average(self, x: Array, swashplate: Array, psi: Array) -> tuple[Array, Array]:
+        """Mean over azimuths, shape (count, n_rotors) [rad], in still air.
+
+        Returns
+        -------
+        rates : ndarray, shape (size + 3,)
+            Of the simulation state x, and the specific force of the c.g. [m/s^2].
+        loads : ndarray, shape (n_rotors, LOAD_SIZE)
+        """
+        rates, loads = np.empty(len(x) + 3), np.empty(R.LOAD_SIZE * self.rotors)
+        averaged_derivative(
+            *(self.code.derivative, self.model, x, np.ravel(swashplate), psi, np.zeros(3), self.work, self.tick),
+            *(rates, loads),
+        )
+        return rates, loads.reshape(self.rotors, -1)
+
+    def memory(self, *shape: int) -> Array:
+        """Zeros with a last axis for the lanes."""
+        return np.asarray(R.aligned((*shape, self.n), float))
+
+    def lanes(self, arrays: Sequence[Array]) -> Array:
+        """Arrays side by side, shape (..., n); what is missing are copies of the last."""
+        made = self.memory(*arrays[0].shape)
+        for lane in range(self.n):
+            made[..., lane] = arrays[min(lane, len(arrays) - 1)]
+        return made
+
+
+_codes: dict[tuple[int, int], Code] = {}

@@ -1,0 +1,208 @@
+"""Flights that go on together, each as it would on its own to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.content import ByContent
+from sbs_sim.engine import Engine
+from sbs_sim.errors import SimulationError
+from sbs_sim.flight_records import Rows
+from sbs_sim.model import state as S
+from sbs_sim.model.fly import fly
+from sbs_sim.model.frames import down_of
+from sbs_sim.model.integrate import FLYING
+from sbs_sim.model.packing import lane_count, side_by_side
+from sbs_sim.model.records import LOAD_SIZE, Model
+from sbs_sim.model.working_state import WORKING_SIZE
+
+if TYPE_CHECKING:
+    from sbs_sim.simulation import Simulation
+
+Array = NDArray[np.float64]
+
+RETIRED = -2  # in place of a state that is to blame for an end
+
+
+class Flown(NamedTuple):
+    """What many ticks of a flight have given.
+
+    Attributes
+    ----------
+    rows : Rows
+    working : ndarray, shape (n, n_rotors, WORKING_SIZE)
+        Working states of the rotors, see `Snapshot`, once every tenth of a second.
+    watched : ndarray of int64, shape (n,)
+        Ticks, from the first that was flown here, at which that was.
+    ticks : int
+        Whole ones that were flown.
+    fault : SimulationError or None
+        Why the flight ended before its last tick; it cannot go on then.
+    """
+
+    rows: Rows
+    working: Array
+    watched: NDArray[np.int64]
+    ticks: int
+    fault: SimulationError | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan(ByContent):
+    """Ticks of a flight that are told of, and the air of all.
+
+    Attributes
+    ----------
+    told, watched : ndarray of int64
+        Ticks from now on: whose instants become rows, and whose working states are looked at.
+    steps, looks : ndarray of int64
+        Steps at which those begin.
+    air : ndarray, shape (ticks + 1, WIND_SIZE)
+    azimuth, wind : ndarray, shapes (len(told), n_rotors) [rad], (len(told), 3) [m/s]
+    watched_azimuth, watched_wind : ndarray
+        The same of the ticks that are watched.
+    """
+
+    told: NDArray[np.int64]
+    watched: NDArray[np.int64]
+    steps: NDArray[np.int64]
+    looks: NDArray[np.int64]
+    air: Array
+    azimuth: Array
+    wind: Array
+    watched_azimuth: Array
+    watched_wind: Array
+
+
+class Formation:
+    """Flights side by side.
+
+    Parameters
+    ----------
+    simulations : sequence of Simulation
+        One, or several, up to `sbs_sim.model.packing.lane_count()`, of aircraft with the same numbers of rotors, blades
+        and elements, the same airfoils and options, at the same step.
+    """
+
+    def __init__(self, simulations: Sequence[Simulation]) -> None:
+        self.simulations, first = tuple(simulations), simulations[0]
+        self._engine = first.engine if len(simulations) == 1 else Engine(_side_by_side(simulations), first.method)
+        self._culprit = np.full(self._engine.n, FLYING, dtype=np.int64)
+        self._bounds = self._engine.lanes([one.bounds for one in simulations])
+        self._start = self._engine.lanes([one.azimuth0 for one in simulations])
+
+    def fly(self, swashplates: Sequence[Array], ticks: int, every: int, loaded: bool) -> list[Flown]:
+        """Fly many ticks in one call of compiled code, during which other threads go on.
+
+        Parameters
+        ----------
+        swashplates : sequence of ndarray, shape (m, n_rotors, 3) each
+            Angles of each tick of each flight [rad], m = ticks or one more, which is then in force at the end.
+        ticks : int
+        every : int
+            Ticks from one row of the result to the next, counted from the start of the flight.
+        loaded : bool
+            False leaves accelerations and loads out.
+
+        Returns
+        -------
+        list of Flown
+            Of each flight. Flights that ended in a call before have no rows.
+        """
+        engine, first, count = self._engine, self.simulations[0], len(swashplates[0])
+        code = engine.code
+        plans = [_plan(one, count, ticks, every, loaded) for one in self.simulations]
+        told, watched = plans[0].told, plans[0].watched
+        x, step = engine.lanes([one.state for one in self.simulations]), np.full(engine.n, first.step)
+        flew = self._culprit == FLYING
+        states, forces = engine.memory(len(told), engine.size), engine.memory(len(told), 3)
+        loads = engine.memory(len(told), LOAD_SIZE * engine.rotors)
+        working = engine.memory(len(watched), engine.rotors, WORKING_SIZE)
+        fly(
+            *(code.advance, code.derivative, code.working_state, engine.model, x, self._start, step),
+            *(first.steps_per_tick, first.step_size, first.method, self._bounds, engine.work, engine.tick),
+            *(self._culprit, engine.lanes([angles.reshape(count, -1) for angles in swashplates])),
+            *(engine.lanes([plan.air for plan in plans]), ticks, _first(told, count), every, loaded),
+            *(engine.lanes([plan.azimuth for plan in plans]), engine.lanes([plan.wind for plan in plans])),
+            *(states, forces, loads, _first(watched, count), first.watch),
+            *(
+                engine.lanes([plan.watched_azimuth for plan in plans]),
+                engine.lanes([plan.watched_wind for plan in plans]),
+            ),
+            working,
+        )
+        found = []
+        for lane, (one, plan, angles) in enumerate(zip(self.simulations, plans, swashplates, strict=True)):
+            end, whole = (int(step[lane]), int(step[lane]) // one.steps_per_tick) if flew[lane] else (-1, -1)
+            whole -= one.step // one.steps_per_tick
+            if flew[lane]:
+                one.go_on(end, x[:, lane].copy(), plan.air[ticks], angles[-1].copy())
+            rows = _rows(one, plan, angles, states[..., lane], forces[..., lane], loads[..., lane])
+            rows = replace(rows, acceleration=rows.acceleration + _gravity(one, rows.state)) if loaded else rows
+            found.append(
+                Flown(
+                    rows.first(int(np.count_nonzero(plan.steps <= end))),
+                    working[plan.looks <= end, ..., lane],
+                    plan.watched[plan.looks <= end],
+                    whole,
+                    self._fault(lane),
+                )
+            )
+        return found
+
+    def retire(self, lane: int) -> None:
+        """Fly one of the flights no further."""
+        self._culprit[lane] = RETIRED
+
+    def _fault(self, lane: int) -> SimulationError | None:
+        """Why a flight has ended."""
+        culprit = int(self._culprit[lane])
+        if culprit in (FLYING, RETIRED):
+            return None
+        value = self._engine.tick.last[min(culprit, self._engine.size - 1), lane]
+        return self.simulations[lane].end(culprit, float(value))
+
+
+def _side_by_side(simulations: Sequence[Simulation]) -> Model:
+    """Models of flights in the lanes; what is missing are copies of the last."""
+    models = [one.model for one in simulations]
+    return side_by_side([*models, *[models[-1]] * (lane_count() - len(models))])
+
+
+def _first(ticks: NDArray[np.int64], otherwise: int) -> int:
+    return int(ticks[0]) if len(ticks) else otherwise
+
+
+def _plan(one: Simulation, count: int, ticks: int, every: int, loaded: bool) -> _Plan:
+    """What is told of so many ticks of a flight."""
+    air = one.air_ahead(ticks)
+    begin = one.step // one.steps_per_tick
+    told, watched = (np.arange(-(-begin // n) * n - begin, count, n) for n in (every, one.watch))
+    steps, looks = (begin + told) * one.steps_per_tick, (begin + watched) * one.steps_per_tick
+    wind = one.air_at(steps, air[told]) if loaded else np.zeros((len(told), 3))
+    seen = one.azimuths(looks), one.air_at(looks, air[watched])
+    return _Plan(told, watched, steps, looks, air, one.azimuths(steps), wind, *seen)
+
+
+def _rows(one: Simulation, plan: _Plan, angles: Array, states: Array, forces: Array, loads: Array) -> Rows:
+    """Instants of a flight; specific forces stand for accelerations."""
+    return Rows(
+        step=plan.steps,
+        time=np.multiply(plan.steps, one.step_size, dtype=float),
+        state=np.ascontiguousarray(states),
+        acceleration=np.ascontiguousarray(forces),
+        swashplate=angles[plan.told],
+        azimuth=plan.azimuth,
+        loads=np.ascontiguousarray(loads).reshape(len(plan.steps), -1, LOAD_SIZE),
+        wind=plan.wind,
+    )
+
+
+def _gravity(one: Simulation, states: Array) -> Array:
+    """Gravity in body axes [m/s^2], shape (n, 3), of states (n, size): what a specific force lacks."""
+    return down_of(states[:, S.ATTITUDE : S.VELOCITY]) * one.aircraft.environment.gravity

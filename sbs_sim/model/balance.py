@@ -1,0 +1,93 @@
+"""Averaged residuals of trimmed flight at many sets of unknowns at once (theory.md section 8)."""
+
+from sbs_sim.lanes import Vector, as_lanes, as_records, rounded, transposed
+from sbs_sim.model import state as S
+from sbs_sim.model.frames import rotation
+from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.mixing import mix
+from sbs_sim.model.trigonometry import cosine_sine
+
+
+@entry
+def trim_residuals(derivative, model, unknowns, motion, places, equations, scales, mixing, psi, work, tick, inputs,
+                   residuals, loads):  # fmt: skip
+    """Scaled residuals of the equations of trim, averaged over the azimuth.
+
+    Parameters
+    ----------
+    derivative, model, work, tick : see `sbs_sim.model.integrate.advance`
+    unknowns : ndarray, shape (m, n_unknowns)
+        Sets of unknowns: pitch, roll [rad], pilot controls [rad], rotor states.
+    motion : ndarray, shape (4,)
+        Velocity forward, right and down in axes of the heading [m/s], rate of the heading [rad/s].
+    places : ndarray of int64
+        Of the rotor states among the unknowns in the simulation state.
+    equations : ndarray of int64, shape (n_equations,)
+        Places in the rate of the simulation state.
+    scales : ndarray, shape (n_equations,)
+        What each is divided by.
+    mixing : ndarray, shape (3 n_rotors, n_controls)
+    psi : ndarray, shape (count, n_rotors)
+        Azimuths [rad].
+    inputs : ndarray, shape (n_unknowns, n)
+        Memory.
+    residuals : ndarray, shape (m, n_equations)
+        Output.
+    loads : ndarray, shape (m, 8 n_rotors)
+        Output: mean loads.
+    """
+    lanes, azimuths = inputs.shape[1], psi.shape[0]
+    count = unknowns.shape[0] * azimuths
+    for i in range(unknowns.shape[0]):
+        for e in range(equations.size):
+            residuals[i, e] = 0.0
+        for k in range(loads.shape[1]):
+            loads[i, k] = 0.0
+    share = 1.0 / azimuths
+    for first in range(0, count, lanes):
+        for lane in range(lanes):
+            number = min(first + lane, count - 1)
+            for i in range(inputs.shape[0]):
+                inputs[i, lane] = unknowns[number // azimuths, i]
+            for j in range(psi.shape[1]):
+                tick.psi[j, lane] = psi[number % azimuths, j]
+        set_flight(model, inputs, motion, places, mixing, tick)
+        derivative(
+            model, tick.stage, tick.slopes[1, : mixing.shape[0]], tick.psi, tick.wind, work, tick.slopes[0], True
+        )
+        for lane in range(min(lanes, count - first)):
+            i = (first + lane) // azimuths
+            for e in range(equations.size):
+                residuals[i, e] += share * (tick.slopes[0, equations[e], lane] / scales[e])
+            for k in range(loads.shape[1]):
+                loads[i, k] += share * work.load_rows[k, lane]
+
+
+@kernel
+def set_flight(model, inputs, motion, places, mixing, tick):
+    """Simulation states, swashplate angles and still air of sets of unknowns."""
+    rotors = as_records(model.rotors)
+    given, x, swash = as_lanes(inputs, rotors), as_lanes(tick.stage, rotors), as_lanes(tick.slopes, rotors)[1]
+    wind = as_lanes(tick.wind, rotors)
+    set_steady_flight(given[0], given[1], motion, x)
+    for i in range(places.size):
+        x[places[i]] = given[inputs.shape[0] - places.size + i]
+    mix(mixing, given, 2, swash)
+    for i in range(3):
+        wind[i] = 0.0
+
+
+@kernel
+def set_steady_flight(pitch, roll, motion, x):
+    """State of a body at the origin that heads north; velocities and rates follow its attitude."""
+    cp, sp = cosine_sine(0.5 * pitch)
+    cr, sr = cosine_sine(0.5 * roll)
+    w, a, b, c = rounded(cr * cp), rounded(sr * cp), rounded(cr * sp), -rounded(sr * sp)
+    to_body = transposed(rotation(w, a, b, c))
+    velocity = to_body @ Vector(motion[0], motion[1], motion[2])
+    rates = to_body @ Vector(0.0, 0.0, motion[3])
+    for i in range(x.shape[0]):
+        x[i] = 0.0
+    x[3], x[4], x[5], x[6] = w, a, b, c
+    x[S.VELOCITY], x[S.VELOCITY + 1], x[S.VELOCITY + 2] = velocity.x, velocity.y, velocity.z
+    x[S.RATES], x[S.RATES + 1], x[S.RATES + 2] = rates.x, rates.y, rates.z

@@ -1,0 +1,57 @@
+"""Normal noise, the same to the last bit on every machine.
+
+numpy promises the bits of PCG64, but neither those of its normal distribution nor those of the mathematical library
+that it asks for the tails.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.lanes import as_lanes, as_records, sqrt
+from sbs_sim.model.frames import ONE
+from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.trigonometry import TURN, cosine_sine
+
+Array = NDArray[np.float64]
+
+LOG_2 = 0.6931471805599453
+ROOT_HALF = 0.7071067811865476
+TERMS = 12  # of the series, whose next one is 1e-19
+SHARE = 2.0**-53  # of the numbers between 0 and 1 that one of 53 bits counts
+
+
+def normal(source: np.random.PCG64, pairs: int) -> Array:
+    """Independent normal numbers of mean 0 and variance 1, shape (pairs, 2)."""
+    out = np.empty((pairs, 2, 1))
+    _box_muller(source.random_raw(2 * pairs).reshape(-1, 2) >> np.uint64(11), ONE, out)
+    return out[..., 0]
+
+
+@entry
+def _box_muller(bits, like, out):
+    """Pairs of normal numbers of pairs of whole numbers of 53 bits.
+
+    G. E. P. Box, M. E. Muller: A note on the generation of random normal deviates, Ann. Math. Stat. 29 (2), 1958.
+    """
+    found = as_lanes(out, as_records(like))
+    for i in range(bits.shape[0]):
+        found[i, 0] = -2.0 * logarithm((float(bits[i, 0]) + 0.5) * SHARE)
+        radius = sqrt(found[i, 0])
+        found[i, 1] = TURN * SHARE * float(bits[i, 1])
+        cosine, sine = cosine_sine(found[i, 1])
+        found[i, 0], found[i, 1] = radius * cosine, radius * sine
+
+
+@kernel
+def logarithm(x):
+    """Natural logarithm of a number above 0: of what is left of it near 1, 2 artanh((m - 1) / (m + 1))."""
+    m, exponent = math.frexp(x)
+    if m < ROOT_HALF:
+        m, exponent = 2.0 * m, exponent - 1
+    s = (m - 1.0) / (m + 1.0)
+    q, series = s * s, 0.0
+    for k in range(TERMS, -1, -1):
+        series = series * q + 1.0 / (2 * k + 1)
+    return exponent * LOG_2 + 2.0 * s * series

@@ -368,18 +368,17 @@ class Aircraft(ByContent):
     def mix(self, controls: ArrayLike) -> Array:
         """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls [rad], shape (4,)."""
         angles = np.empty((3 * len(self.rotors), 1))
-        mixed(self._mixing, np.asarray(controls, dtype=float).reshape(-1, 1), ONE, angles)
+        mixed(self.mixing, np.asarray(controls, dtype=float).reshape(-1, 1), ONE, angles)
         return angles.reshape(-1, 3)
 
     @cached_property
-    def _mixing(self) -> Array:
+    def mixing(self) -> Array:
+        """Swashplate angles of all rotors over the pilot controls, shape (3 n_rotors, 4)."""
         return np.concatenate([rotor.mixing for rotor in self.rotors])
 
     def unmix(self, angles: Array) -> Array:
         """Pilot controls [rad], shape (4,), whose mixture is nearest to swashplate angles [rad], (n_rotors, 3)."""
-        mixing = np.concatenate([rotor.mixing for rotor in self.rotors])
-        controls: Array = np.linalg.lstsq(mixing, np.ravel(angles), rcond=None)[0]
-        return controls
+        return np.asarray(np.linalg.lstsq(self.mixing, np.ravel(angles), rcond=None)[0], dtype=np.float64)
 
     def fuselage(self) -> tuple[float, Array, Array]:
         """Mass [kg], first moment [kg m] and inertia [kg m^2] about the c.g. of the aircraft without blades.

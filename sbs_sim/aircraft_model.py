@@ -10,6 +10,7 @@ from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells
 from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import hub_axes
+from sbs_sim.model.state import harmonic_count
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft, Rotor
@@ -35,7 +36,7 @@ def model_of(aircraft: "Aircraft") -> R.Model:
         for k in range(rotor.blades):
             _set(blades[number], _blade_values(aircraft, rotor, k, airfoil, first_rows[airfoil]))
             blades[number]["quad"], blades[number]["begins"] = quads[j] + k // R.QUAD, k % R.QUAD == 0
-            blades[number]["elements"], blades[number]["harmonics"] = j, (rotor.blades - 1) // 2
+            blades[number]["elements"], blades[number]["harmonics"] = j, harmonic_count(rotor.blades)
             inner = airfoil.reynolds[1:-1]
             knots[number, :, 0] = np.concatenate([inner, np.full(most - len(inner), np.inf)])
             number += 1
@@ -182,7 +183,7 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
         _set(rotors[j], values)
         whole = {
             "blades": rotor.blades,
-            "harmonics": (rotor.blades - 1) // 2,
+            "harmonics": harmonic_count(rotor.blades),
             "first_quad": quads[j],
             "quads": quads[j + 1] - quads[j],
             "flap": layout.flap(j).start,
@@ -199,7 +200,7 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
 def _places(aircraft: "Aircraft", quads: NDArray[np.int64]) -> R.Places:
     """See `Places`; the zero stands behind the state."""
     layout, zero = aircraft.layout, aircraft.layout.size
-    harmonics = max((rotor.blades - 1) // 2 for rotor in aircraft.rotors)
+    harmonics = max(harmonic_count(rotor.blades) for rotor in aircraft.rotors)
     number = np.concatenate([np.full(quads[j + 1] - quads[j], j) for j in range(len(aircraft.rotors))])
     first = {
         name: [getattr(layout, name)(j).start for j in number] for name in ("flap", "flap_rate", "lag", "lag_rate")
@@ -209,7 +210,7 @@ def _places(aircraft: "Aircraft", quads: NDArray[np.int64]) -> R.Places:
         places = np.full((2 * harmonics + 2, len(number)), zero, dtype=np.int64)
         for quad, (start, j) in enumerate(zip(starts, number, strict=True)):
             blades = aircraft.rotors[j].blades
-            turning = 1 + 2 * ((blades - 1) // 2)
+            turning = 1 + 2 * harmonic_count(blades)
             places[:turning, quad] = start + np.arange(turning)
             if blades % 2 == 0:
                 places[-1, quad] = start + blades - 1

@@ -584,7 +584,7 @@ def simulate(
         See `Simulation`; controls beyond their ranges, naming control, time, value and range, or more rows of them than
         ticks; the flight cannot go on.
     """
-    flown, fault = fly_commands(
+    sortie = Sortie(
         aircraft,
         start,
         controls,
@@ -598,24 +598,15 @@ def simulate(
         method=method,
         ground_altitude=ground_altitude,
     )
+    fly_together([sortie])
+    flown, fault = sortie.result()
     if fault is not None:
         raise fault
     return flown
 
 
-def fly_commands(
-    aircraft: Aircraft,
-    start: TrimPoint | ArrayLike,
-    controls: Commands,
-    duration: float,
-    *,
-    every: int = 1,
-    loaded: bool = True,
-    wind: Wind | None = None,
-    actuators: bool = False,
-    **options: Any,
-) -> tuple[History, SimulationError | None]:
-    """Fly as `simulate` does, as far as it goes.
+class Sortie:
+    """A flight under commands: what it is to be, and what became of it.
 
     Parameters
     ----------
@@ -628,27 +619,10 @@ def fly_commands(
     **options :
         The others of `Simulation`.
 
-    Returns
-    -------
-    histories : History
-        See `simulate`; up to the last good tick.
-    fault : SimulationError or None
-        Why the flight ended early.
-
     Raises
     ------
     SimulationError
         The flight cannot begin.
-    """
-    sortie = Sortie(
-        aircraft, start, controls, duration, every=every, loaded=loaded, wind=wind, actuators=actuators, **options
-    )
-    fly_together([sortie])
-    return sortie.result()
-
-
-class Sortie:
-    """A flight under commands, see `fly_commands`: what it is to be, and what became of it.
 
     Attributes
     ----------
@@ -712,7 +686,13 @@ class Sortie:
         self.fault = self._wrong
 
     def result(self) -> tuple[History, SimulationError | None]:
-        """See `fly_commands`."""
+        """Histories up to the last good tick, see `simulate`, and why the flight ended early, or None.
+
+        Raises
+        ------
+        SimulationError
+            Not even the first tick was flown.
+        """
         if not self._blocks and self.fault is not None:
             raise self.fault
         aircraft = self.simulation.aircraft

@@ -4,8 +4,8 @@ import importlib.metadata
 import platform
 
 from numba import config
-from numba.core.registry import cpu_target
 
+from sbs_sim.model.kernel import target
 from sbs_sim.model.kernel_cache import source_digest
 
 TARGET = "target"
@@ -40,10 +40,9 @@ def compilation_target() -> dict[str, str]:
     """What the compiled kernels are made for: "target", "target_features", "optimisation"."""
     if config.DISABLE_JIT:
         return {TARGET: INTERPRETER, FEATURES: "", "optimisation": ""}
-    _, name, features = cpu_target.target_context.codegen().magic_tuple()
-    chosen = sorted(feature[1:] for feature in features.split(",") if feature.startswith("+"))
+    name, features = target()
     passes = "".join(" vectorized " + kind for kind, on in _vectorizers() if on)
-    return {TARGET: name, FEATURES: ",".join(chosen), "optimisation": f"O{int(config.OPT)}{passes}"}
+    return {TARGET: name, FEATURES: ",".join(sorted(features)), "optimisation": f"O{int(config.OPT)}{passes}"}
 
 
 def _vectorizers() -> tuple[tuple[str, bool], ...]:

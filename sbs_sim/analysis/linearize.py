@@ -401,13 +401,12 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
     used = np.zeros(len(inputs), dtype=bool)
     used[used_states(point)] = used[len(point.state) :] = True
     result = np.zeros((len(psi), len(inputs), outputs))
-    mixing = np.concatenate([rotor.mixing for rotor in aircraft.rotors])
     jacobian(
         *(
             engine.code.derivative,
             engine.model,
             inputs,
-            mixing,
+            aircraft.mixing,
             np.where(used, steps, 0.0),
             psi,
             engine.work,

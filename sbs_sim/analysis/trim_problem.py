@@ -249,7 +249,6 @@ class TrimProblem:
         self.lead_lag, self.cyclic_inflow, self.azimuth_count = lead_lag, cyclic_inflow, azimuth_count
         self.layout = aircraft.layout
         self.engine = Engine(aircraft.arranged(lead_lag, cyclic_inflow, "points"))
-        self._mixing = np.concatenate([rotor.mixing for rotor in aircraft.rotors])
         self._psi = azimuths(self.layout.blades, azimuth_count)
         self._places, equations = self._rotor_unknowns()
         self.equations = np.concatenate([np.arange(S.VELOCITY, S.BODY_SIZE), equations])
@@ -329,7 +328,7 @@ class TrimProblem:
         residuals, loads = np.empty((len(unknowns), len(self.equations))), np.empty((len(unknowns), self.loads.size))
         trim_residuals(
             *(engine.code.derivative, engine.model, unknowns, condition.along_heading(), self._places, self.equations),
-            *(self.scales, self._mixing, psi, engine.work, engine.tick, engine.memory(unknowns.shape[1])),
+            *(self.scales, self.aircraft.mixing, psi, engine.work, engine.tick, engine.memory(unknowns.shape[1])),
             *(residuals, loads),
         )
         return residuals, loads

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.analysis.newton import Equations, newton
+from sbs_sim.analysis.trim_guess import DIGITS
 from sbs_sim.analysis.trim_problem import BODY_UNKNOWNS, TrimCondition, TrimProblem
 from sbs_sim.errors import TrimError
 from sbs_sim.model.average import azimuths
@@ -25,7 +26,6 @@ IntArray = NDArray[np.int64]
 TOLERANCE = 1e-6  # of both loops: largest change of an unknown, relative to its size or to SMALL
 SMALL = 0.01  # rad, or inflow over tip speed: what counts as the size of smaller unknowns
 RELAXATION = 0.5  # share of the way to the steady inflow
-DECIMALS = 9  # of a first guess: what is symmetric begins exactly so
 MOST_OUTER, MOST_INNER = 30, 100
 GUESSED = 2  # outer iterations whose changes are those of the first guess: from then on they are to shrink
 # What the complete equations may leave where the loops come to rest. The balance of blades that do not vibrate is not
@@ -69,7 +69,7 @@ class _TwoLoops:
     """
 
     def __init__(self, problem: TrimProblem, condition: TrimCondition, start: Array) -> None:
-        self.unknowns = start.round(DECIMALS)  # without rounding errors, which the outer loop multiplies
+        self.unknowns = start.round(DIGITS)  # without rounding errors, which the outer loop multiplies
         self.outer = self.inner = 0
         self.change = math.inf
         self._problem, self._condition = problem, condition

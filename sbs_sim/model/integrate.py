@@ -132,13 +132,6 @@ def set_azimuths(rotors, start, time, psi):
         psi[j] = angle - TURN * floor(angle * INVERSE_TURN)
 
 
-@entry
-def azimuths_at(rotors, psi0, time, psi):
-    """Azimuths [rad], shape (n_rotors, n), a time after step 0, as a step has them."""
-    records = as_records(rotors)
-    set_azimuths(records, as_lanes(psi0, records), time, as_lanes(psi, records))
-
-
 @kernel
 def copy_rows(source, target):
     """Copy numbers one by one: a slice would be allocated."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import numba
 from llvmlite.binding import executionengine
+from numba.core.registry import cpu_target
 from numba.types import WrapperAddressProtocol
 
 from sbs_sim.interruption import raised_outside
@@ -94,14 +95,12 @@ def address(function: Any, *arguments: Any) -> Any:
     return function if numba.config.DISABLE_JIT else Address(function, *arguments)
 
 
-def target_features() -> set[str]:
-    """Features of the processor that is compiled for, which the environment may set (NUMBA_CPU_FEATURES)."""
+def target() -> tuple[str, frozenset[str]]:
+    """Processor that is compiled for and its features, which the environment may set; "" and none where nothing is."""
     if numba.config.DISABLE_JIT:
-        return set()
-    from numba.core.registry import cpu_target
-
-    _, _, features = cpu_target.target_context.codegen().magic_tuple()
-    return {feature[1:] for feature in features.split(",") if feature.startswith("+")}
+        return "", frozenset()
+    _, name, features = cpu_target.target_context.codegen().magic_tuple()
+    return name, frozenset(feature[1:] for feature in features.split(",") if feature.startswith("+"))
 
 
 @contextlib.contextmanager

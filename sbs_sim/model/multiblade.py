@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.lanes import add_to_quads, spread
 from sbs_sim.model.kernel import kernel
+from sbs_sim.model.state import harmonic_count
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ def blade_matrix(blades: int, azimuth: float | Array, order: int = 0) -> Array:
     """
     psi = np.asarray(azimuth)[..., None] + 2 * math.pi * np.arange(blades) / blades
     columns: list[NDArray[Any]] = [np.full_like(psi, order == 0)]
-    for harmonic in range(1, (blades - 1) // 2 + 1):
+    for harmonic in range(1, harmonic_count(blades) + 1):
         angle = harmonic * psi + order * math.pi / 2
         columns += [-(harmonic**order) * np.cos(angle), -(harmonic**order) * np.sin(angle)]
     if blades % 2 == 0:

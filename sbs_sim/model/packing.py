@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.model.kernel import target_features
+from sbs_sim.model.kernel import target
 from sbs_sim.model.records import BLADE, ELEMENT, QUAD, Model, Places, aligned
 
 WIDE = "avx512f"  # what a processor has that holds eight numbers in a register
@@ -18,7 +18,8 @@ WIDE = "avx512f"  # what a processor has that holds eight numbers in a register
 
 def lane_count() -> int:
     """Numbers side by side in a register of the processor that is compiled for: 8 or 4."""
-    return 8 if WIDE in target_features() else QUAD
+    _, features = target()
+    return 8 if WIDE in features else QUAD
 
 
 def side_by_side(models: Sequence[Model]) -> Model:

@@ -40,6 +40,11 @@ _ROTOR_STATE = re.compile(
 )
 
 
+def harmonic_count(blades: int) -> int:
+    """Harmonics of the multiblade coordinates of a rotor, cosine and sine each."""
+    return (blades - 1) // 2
+
+
 def multiblade_suffixes(blades: int) -> tuple[str, ...]:
     """Names of the coordinates of one rotor: collective, cosine and sine of each harmonic, differential.
 
@@ -54,7 +59,7 @@ def multiblade_suffixes(blades: int) -> tuple[str, ...]:
         ("0", "c", "s") for three blades, then ("2c", "2s"), ... and "d" last for an even number.
     """
     names = ["0", "c", "s"]
-    for harmonic in range(2, (blades - 1) // 2 + 1):
+    for harmonic in range(2, harmonic_count(blades) + 1):
         names += [f"{harmonic}c", f"{harmonic}s"]
     return tuple(names + ["d"] if blades % 2 == 0 else names)
 

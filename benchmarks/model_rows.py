@@ -1,4 +1,4 @@
-"""Times of the derivative and of flights in time, the error of each step, and how the cost grows with the aircraft."""
+"""Times of the derivative and of flights, and how the cost grows with the aircraft."""
 
 import copy
 import math
@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 from plain_ratio import package_calls, plain_rows
+from step_errors import step_rows
 
-from sbs_sim import Aircraft, simulate, trim
-from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim import Aircraft, trim
 from sbs_sim.model import state as S
 from sbs_sim.simulation import trimmed_state
 
@@ -18,19 +18,6 @@ Row = tuple[str, float, str, str]
 Timed = Callable[..., tuple[float, str]]
 
 CALLS = 1000
-DURATION, TICK = 10.0, 0.01  # s
-DOUBLETS = ((0, 0.0), (1, 2.0), (2, 4.0))  # control, start [s]: a degree up for half a second, then down
-STEPS = (
-    ("rk4", 1.0),
-    ("rk4", 2.5),
-    ("rk4", 5.0),
-    ("rk4", 10.0),
-    ("tsit5", 7.2),
-    ("tsit5", 14.4),
-    ("tsit5", 28.8),
-    ("tsit5", 36.0),
-)
-REFERENCE = ("rk4", 0.5)
 
 
 def model_rows(timed: Timed) -> list[Row]:
@@ -44,45 +31,13 @@ def model_rows(timed: Timed) -> list[Row]:
             derivatives(aircraft, trimmed_state(aircraft, point), point.swashplate), 21, time.thread_time
         )
         rows += [(f"derivative, {name}", 1e6 * seconds / CALLS, "us", note), *plain_rows(aircraft, point, name)]
-    return [*rows, *integration_rows(aircraft, points["hover"]), *growth_rows(aircraft, timed)]
+    return [*rows, *step_rows(aircraft), *growth_rows(aircraft, timed)]
 
 
 def derivatives(aircraft: Aircraft, x: Any, swash: Any) -> Callable[[], None]:
     """Many complete derivatives, all over the azimuth."""
     call, _ = package_calls(aircraft, x, swash)
     return lambda: call(CALLS)
-
-
-# --- flights ----------------------------------------------------------------------------------------------------
-
-
-def integration_rows(aircraft: Aircraft, hover: TrimPoint) -> list[Row]:
-    """Real-time factor of ten seconds of manoeuvre and the largest error on the way, for several steps."""
-    controls = np.tile(hover.controls, (round(DURATION / TICK) + 1, 1))
-    at = TICK * np.arange(len(controls))
-    for control, start in DOUBLETS:
-        since = at - start + 0.5 * TICK
-        controls[:, control] += math.radians(1.0) * (
-            ((since > 0) & (since < 0.5)) * 1.0 - ((since > 0.5) & (since < 1))
-        )
-    reference, _ = flown(aircraft, hover, controls, *REFERENCE)
-    rows: list[Row] = []
-    for method, degrees in STEPS:
-        flown(aircraft, hover, controls[:2], method, degrees)
-        runs = [flown(aircraft, hover, controls, method, degrees) for _ in range(3)]
-        error = np.abs(runs[0][0] - reference)
-        body, every = error[:, S.VELOCITY : S.BODY_SIZE].max(), error[:, S.VELOCITY :].max()
-        note = f"{DURATION:g} s of doublets, largest error on the way: body {body:.1e}, all states {every:.1e}"
-        factor = (len(controls) - 1) * TICK / float(np.median([seconds for _, seconds in runs]))
-        rows.append((f"simulate, {method} {degrees:g} deg", factor, "x real", note))
-    return rows
-
-
-def flown(aircraft: Aircraft, hover: TrimPoint, controls: Any, method: str, degrees: float) -> tuple[Any, float]:
-    """States of a flight and the time of the processor that it took [s]."""
-    start, duration = time.thread_time(), TICK * (len(controls) - 1)
-    flight = simulate(aircraft, hover, controls, duration, tick=TICK, azimuth_step=math.radians(degrees), method=method)
-    return flight["state"], time.thread_time() - start
 
 
 # --- growth -----------------------------------------------------------------------------------------------------

@@ -423,6 +423,11 @@ class Aircraft(ByContent):
         return self._arrangements[key]
 
     @cached_property
+    def rotor_matrices(self) -> dict[tuple[bool, bool, float], Any]:
+        """What `sbs_sim.rotor_matrices` has worked out of this aircraft."""
+        return {}
+
+    @cached_property
     def _arrangements(self) -> dict[tuple[bool, bool, str], Model]:
         return {}
 

@@ -13,6 +13,7 @@ from sbs_sim.model.average import averaged_derivative
 from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.integrate import RK4, STAGES, advance
 from sbs_sim.model.kernel import address
+from sbs_sim.model.packing import lane_count
 from sbs_sim.model.wind import WIND_SIZE
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
 
@@ -36,6 +37,8 @@ class Engine:
         As `Aircraft.arranged` gives it, or `side_by_side`.
     method : int, optional
         Of integration, see `sbs_sim.model.integrate`.
+    exponential : Exponential, optional
+        Matrices of the exponential method, with as many lanes.
 
     Attributes
     ----------
@@ -47,9 +50,11 @@ class Engine:
         Of the state, and of the aircraft.
     """
 
-    def __init__(self, model: R.Model, method: int = RK4) -> None:
+    def __init__(self, model: R.Model, method: int = RK4, exponential: R.Exponential | None = None) -> None:
         self.model, self.work = model, R.make_work(model)
-        self.tick = R.make_tick(self.work, int(STAGES[method]))
+        n, width = model.air["density"].shape[-1], lane_count()
+        none = R.make_exponential([], [[]] * n, width if n == 1 else n)
+        self.tick = R.make_tick(self.work, int(STAGES[method]), none if exponential is None else exponential)
         self.size, self.n = self.tick.stage.shape
         self.rotors = len(self.tick.psi)
 

@@ -18,8 +18,9 @@ from sbs_sim.model.fly import fly
 from sbs_sim.model.frames import down_of
 from sbs_sim.model.integrate import FLYING
 from sbs_sim.model.packing import lane_count, side_by_side
-from sbs_sim.model.records import LOAD_SIZE, Model
+from sbs_sim.model.records import LOAD_SIZE
 from sbs_sim.model.working_state import WORKING_SIZE
+from sbs_sim.rotor_matrices import arranged
 
 if TYPE_CHECKING:
     from sbs_sim.simulation import Simulation
@@ -91,7 +92,7 @@ class Formation:
 
     def __init__(self, simulations: Sequence[Simulation]) -> None:
         self.simulations, first = tuple(simulations), simulations[0]
-        self._engine = first.engine if len(simulations) == 1 else Engine(_side_by_side(simulations), first.method)
+        self._engine = first.engine if len(simulations) == 1 else _engine(simulations)
         self._culprit = np.full(self._engine.n, FLYING, dtype=np.int64)
         self._bounds = self._engine.lanes([one.bounds for one in simulations])
         self._start = self._engine.lanes([one.azimuth0 for one in simulations])
@@ -168,10 +169,11 @@ class Formation:
         return self.simulations[lane].end(culprit, float(value))
 
 
-def _side_by_side(simulations: Sequence[Simulation]) -> Model:
-    """Models of flights in the lanes; what is missing are copies of the last."""
-    models = [one.model for one in simulations]
-    return side_by_side([*models, *[models[-1]] * (lane_count() - len(models))])
+def _engine(simulations: Sequence[Simulation]) -> Engine:
+    """What flies flights in the lanes; what is missing are copies of the last."""
+    filled = [*simulations, *[simulations[-1]] * (lane_count() - len(simulations))]
+    model, matrices = side_by_side([one.model for one in filled]), arranged([one.rotor_matrices for one in filled])
+    return Engine(model, filled[0].method, matrices)
 
 
 def _first(ticks: NDArray[np.int64], otherwise: int) -> int:

@@ -14,7 +14,8 @@ from sbs_sim.model import wind as W
 from sbs_sim.model.average import azimuths
 from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.frames import ONE
-from sbs_sim.model.integrate import FLYING, RK4, TSIT5, advance
+from sbs_sim.model.integrate import ETD, FLYING, RK4, TSIT5, advance
+from sbs_sim.rotor_matrices import arranged, rotor_matrices
 
 CALM = np.zeros(3)
 VACUUM = {"air_density": 0.0}
@@ -161,6 +162,9 @@ class Model:
     def tick(self, x, swash, psi0, first_step, steps, h, air, method, bounds):
         """Steps made, the culprit, and the state after a tick of `advance`."""
         engine, culprit, x = self.engine, np.full(self.engine.n, FLYING), self.lanes(x)
+        if method == ETD:
+            matrices = rotor_matrices(self.aircraft, self.lead_lag, self.cyclic_inflow, h)
+            engine = Engine(engine.model, method, arranged([matrices]))
         advance(
             *(engine.code.derivative, engine.model, x, self.lanes(swash), self.lanes(psi0), first_step, steps, h),
             *(self.lanes(air), method, self.lanes(bounds), engine.work, engine.tick, engine.tick.done, culprit),

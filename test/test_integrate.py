@@ -1,17 +1,22 @@
 """Steps in time: order, agreement of the methods, flights that are repeated, bounded, and answer rightly."""
 
+import math
+
 import numpy as np
 import pytest
 from helpers import Model, build, linear_airfoil, wind_velocity
+from scipy.linalg import expm
 from test_conservation import ONE_SECOND, PSI, STEP, differences, disturbed
 
-from sbs_sim import Simulation, simulate
+from sbs_sim import Simulation, simulate, trim
 from sbs_sim.errors import SimulationError
 from sbs_sim.model import state as S
 from sbs_sim.model import wind as W
+from sbs_sim.model.exponential import coefficients
 from sbs_sim.model.frames import euler_to_quaternion
-from sbs_sim.model.integrate import PARTITIONED, RK4, TSIT5, TSITOURAS
-from sbs_sim.simulation import trimmed_state
+from sbs_sim.model.integrate import CLASSICAL, ETD, PARTITIONED, RK4, TSIT5, TSITOURAS
+from sbs_sim.rotor_matrices import rotor_matrices
+from sbs_sim.simulation import METHODS, trimmed_state
 
 QUARTER = 0.25  # s, ten revolutions
 FIVE_DEG = 720  # steps of 5 deg in that time
@@ -27,7 +32,8 @@ def smooth_model(tmp_path_factory):
 def flights(model, hover, refinements, method=RK4):
     """Return the states after a quarter of a second with steps of 5 deg / refinement."""
     x, swash = disturbed(model, hover)
-    return [model.fly(x, FIVE_DEG * k, QUARTER / (FIVE_DEG * k), swash, method=method) for k in refinements]
+    counts = [round(FIVE_DEG * k) for k in refinements]
+    return [model.fly(x, count, QUARTER / count, swash, method=method) for count in counts]
 
 
 def changes(states):
@@ -50,6 +56,21 @@ def test_tsitouras_is_of_fifth_order(smooth_model, hover):
     change = changes(coarse)
     np.testing.assert_allclose(change[:-1] / change[1:], 32.0, atol=4.0)
     np.testing.assert_allclose(coarse[-1], flights(smooth_model, hover, (16,))[0], atol=1e-8)
+
+
+def test_exponential_steps_are_of_fourth_order(smooth_model, hover):
+    """Half the step, a sixteenth of the change, to the solution of the other methods."""
+    coarse = flights(smooth_model, hover, (0.5, 1, 2, 4), ETD)
+    change = changes(coarse)
+    np.testing.assert_allclose(change[1:-1] / change[2:], 16.0, atol=2.0)
+    np.testing.assert_allclose(coarse[-1], flights(smooth_model, hover, (16,))[0], atol=1e-8)
+
+
+def test_long_exponential_steps_are_as_good_as_short_classical_ones(sbs, hover):
+    """In steps of 14.4 deg the error of every state is the smaller one, for a third of the derivatives."""
+    fine, coarse = flights(Model(sbs), hover, (16, 1))
+    exponential = flights(Model(sbs), hover, (5.0 / 14.4,), ETD)[0]
+    assert np.abs(exponential - fine).max() < np.abs(coarse - fine).max()
 
 
 def test_long_steps_of_fifth_order_are_as_good_as_short_ones_of_fourth(sbs, hover):
@@ -196,6 +217,91 @@ def test_tsitouras_steps_are_those_of_the_tableau():
     np.testing.assert_allclose(flight.flown(TSIT5)[2], x, rtol=1e-11, atol=1e-13)
 
 
+def phi(z, count=4):
+    """phi_0 .. phi_3 of a matrix: the blocks of an exponential (N. J. Higham, Functions of Matrices, theorem 10.9)."""
+    m = len(z)
+    large = np.zeros((count * m, count * m))
+    large[:m, :m] = z
+    large[:-m, m:] += np.eye((count - 1) * m)
+    return np.hsplit(expm(large)[:m], count)
+
+
+def test_exponential_steps_are_krogstads():
+    """Eqs. (51) to (54) of the paper, by what differs from the linear part at the beginning."""
+    flight = Disturbed()
+    x, h, linear = flight.x.copy(), flight.h, linear_part(flight.model, flight.h)
+    (_, half1, half2, _), (_, one1, one2, one3) = phi(0.5 * h * linear), phi(h * linear)
+    for i in range(flight.steps):
+        first = flight.slope(x, i)
+
+        def other(stage, ahead, x=x, first=first):
+            return flight.slope(stage, ahead) - first - linear @ (stage - x)
+
+        second = x + h / 2 * half1 @ first
+        na = other(second, i + 0.5)
+        third = second + h * half2 @ na
+        nb = other(third, i + 0.5)
+        fourth = x + h * one1 @ first + 2 * h * one2 @ nb
+        nc = other(fourth, i + 1)
+        x = x + h * (one1 @ first + (2 * one2 - 4 * one3) @ (na + nb) + (4 * one3 - one2) @ nc)
+        x = unit_attitude(x)
+    np.testing.assert_allclose(flight.flown(ETD)[2], x, rtol=1e-10, atol=1e-12)
+
+
+def linear_part(model, h):
+    """L of all states."""
+    linear, matrices = np.zeros((model.layout.size, model.layout.size)), rotor_matrices(model.aircraft, True, True, h)
+    for block, own in zip(matrices.blocks, matrices.linear, strict=True):
+        linear[np.ix_(block, block)] = own
+    return linear
+
+
+@pytest.mark.parametrize("size", [1.0, 30.0, 1e4])
+def test_coefficients_solve_linear_equations_exactly(size):
+    """A whole step of y' = L y multiplies by the exponential of h L, whatever else the stages are."""
+    rng, h = np.random.default_rng(4), 0.01
+    linear = size * (rng.standard_normal((6, 6)) - 3.0 * np.eye(6))
+    found, tableau = coefficients(linear, h), ((0,), (1, 2), (3, 4, 5), (6, 7, 8, 9))
+    y = rng.standard_normal(6)
+    slopes = [linear @ y]
+    for row in tableau:
+        stage = y + sum(found[k] @ slope for k, slope in zip(row, slopes, strict=True))
+        slopes.append(linear @ stage)
+    np.testing.assert_allclose(stage, expm(h * linear) @ y, rtol=1e-10, atol=1e-12)
+
+
+def test_coefficients_without_a_linear_part_are_the_classical_ones():
+    weights = (*CLASSICAL[1, :1], *CLASSICAL[2, :2], *CLASSICAL[3, :3], *CLASSICAL[-1, :4])
+    np.testing.assert_allclose(
+        coefficients(np.zeros((2, 2)), 0.3), 0.3 * np.multiply.outer(weights, np.eye(2)), atol=1e-16
+    )
+
+
+@pytest.mark.parametrize("blades", [3, 4, 5, 7])
+def test_linear_part_of_a_rotor_in_vacuum_has_its_frequencies(blades):
+    """A hinge at the axis with a spring flaps with nu; in multiblade coordinates harmonic n with nu +- n Omega."""
+    rotor = {"blades": blades, "hinge_offset": 0.0, "flap_hinge_offset": 0.0, "flap_spring": 60.0, "lag_spring": 0.0}
+    made = build(every_rotor=rotor, environment={"air_density": 0.0}, options={"coupling": "paper"})
+    matrices, own = rotor_matrices(made, True, True, 1e-3), made.rotors[0]
+    flap = math.sqrt(1.0 + own.flap_spring / (own.second_moment * own.speed**2))
+    for block, linear in zip(matrices.blocks, matrices.linear, strict=True):
+        names = [made.layout.names[i] for i in block if "xi" not in made.layout.names[i]]
+        harmonic = 0 if names[0].startswith("ad") else max(S.part_of(name).harmonic for name in names)
+        found = np.sort(np.abs(np.linalg.eigvals(linear).imag) / own.speed)
+        wanted = abs(np.array([flap + harmonic, flap - harmonic]))
+        assert all(np.abs(found - frequency).min() < 1e-6 for frequency in wanted), names
+
+
+def test_a_stiff_rotor_takes_long_steps(sbs):
+    """A flap spring whose frequency is far above that of the steps: the blade moves as one without a hinge does."""
+    stiff = build(every_rotor={"flap_spring": 1e7})
+    hover = trim(stiff)
+    kick = hover.controls + np.radians([0.5, 0.3, 0.2, 0.0])
+    coarse, fine = (simulate(stiff, hover, kick, 0.3, azimuth_step=math.radians(step)) for step in (14.4, 1.0))
+    body = slice(S.VELOCITY, S.BODY_SIZE)
+    np.testing.assert_allclose(coarse["state"][:, body], fine["state"][:, body], atol=1e-3)
+
+
 @pytest.mark.parametrize("state", [S.POSITION, S.POSITION + 2], ids=["north", "down"])
 def test_a_tick_ends_before_what_is_implausible(state):
     """The bound of a state, were it the very first, is passed in the second step: the state is that after the first."""
@@ -238,9 +344,10 @@ def test_partitioned_scheme_converges_to_the_coupled_solution(smooth_model, hove
 
 def test_methods_by_name(sbs, hover):
     """`simulate` offers all methods; in the equilibrium of hover they agree."""
-    flown = [simulate(sbs, hover, hover.controls, 0.2, method=name) for name in ("rk4", "partitioned", "tsit5")]
-    np.testing.assert_allclose(flown[1]["state"], flown[0]["state"], atol=1e-9)
-    np.testing.assert_allclose(flown[2]["state"], flown[0]["state"], atol=1e-9)
+    first, *others = (simulate(sbs, hover, hover.controls, 0.2, method=name) for name in METHODS)
+    assert len(others) == 3
+    for flight in others:
+        np.testing.assert_allclose(flight["state"], first["state"], atol=1e-9)
 
 
 # -- flights -------------------------------------------------------------------------------------------------

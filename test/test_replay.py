@@ -489,7 +489,7 @@ def test_commands_act_at_their_time_on_rotors_of_another_speed(tmp_path, hover):
     found = replay("--with", changes[0], "--with", changes[1], "--output", fast, path)
     assert found.returncode == 0, found.stderr
     before, after = read(path), read(fast)
-    # 0.01 s are 29 steps of 5 deg at most at 2400 rpm, 36 at 3000 rpm
-    np.testing.assert_array_equal(after["events"]["step"] / 36, before["events"]["step"] / 29)
+    # 0.01 s are 10 steps of 14.4 deg at most at 2400 rpm, 13 at 3000 rpm
+    np.testing.assert_array_equal(after["events"]["step"] / 13, before["events"]["step"] / 10)
     assert after["state"].time[-1] == pytest.approx(before["state"].time[-1])
     assert_identical(fast)

@@ -1,16 +1,18 @@
-"""Fixed steps in time: explicit Runge-Kutta methods, and the paper's partitioned scheme (theory.md section 7)."""
+"""Fixed steps in time: Runge-Kutta methods, and the paper's partitioned scheme (theory.md section 7)."""
 
 import math
 
 import numpy as np
 
 from sbs_sim.lanes import all_lanes, any_lane, as_lanes, as_records, floor, sqrt
+from sbs_sim.model.exponential import begin_exponential_step, exponential_stage
 from sbs_sim.model.ground import lowest
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_rotation_terms
+from sbs_sim.model.state import BODY_SIZE
 from sbs_sim.model.wind import wind_at
 
-RK4, PARTITIONED, TSIT5 = range(3)
+RK4, PARTITIONED, TSIT5, ETD = range(4)
 MOST_STAGES = 6
 TURN, INVERSE_TURN = 2.0 * math.pi, 1.0 / (2.0 * math.pi)
 FLYING = -1  # no state is to blame for an end
@@ -37,8 +39,8 @@ TSITOURAS = _tableau(
     (5.86145544294642, -12.92096931784711, 8.159367898576159, -0.071584973281401, -0.028269050394068383),
     (0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742, -3.290069515436081, 2.324710524099774),
 )
-TABLEAUS = np.stack([CLASSICAL, CLASSICAL, TSITOURAS])
-STAGES = np.array([4, 4, 6])
+TABLEAUS = np.stack([CLASSICAL, CLASSICAL, TSITOURAS, CLASSICAL])
+STAGES = np.array([4, 4, 6, 4])
 
 
 @entry
@@ -62,7 +64,7 @@ def advance(derivative, model, x, swash, psi0, first_step, steps, h, wind, metho
     wind : ndarray, shape (WIND_SIZE, n)
         Air of this tick.
     method : int
-        RK4, PARTITIONED or TSIT5.
+        RK4, PARTITIONED, TSIT5 or ETD.
     bounds : ndarray, shape (size + 1, n)
         Largest magnitude of each state that is still plausible, and the down coordinate of the ground [m].
     work : Work
@@ -95,33 +97,47 @@ def make_step(derivative, model, x, swash, psi0, number, h, wind, fraction, shar
     state, stage, air = as_lanes(x, rotors), as_lanes(tick.stage, rotors), as_lanes(wind, rotors)
     slopes, psi, blowing = as_lanes(tick.slopes, rotors), as_lanes(tick.psi, rotors), as_lanes(tick.wind, rotors)
     start, tableau, count, time = as_lanes(psi0, rotors), TABLEAUS[method], STAGES[method], number * h
+    if method == ETD:
+        begin_exponential_step(rotors, tick.exponential, state)
     for k in range(count):
-        ahead = combine(state, slopes, tableau[k], k, h, stage)
+        ahead = node(tableau[k], k)
+        if k == 0 or method != ETD:
+            combine(state, slopes, tableau[k], k, h, state.shape[0], stage)
         set_azimuths(rotors, start, (number + ahead) * h, psi)
         wind_at(air, time + ahead * h, fraction + ahead * share, blowing)
         derivative(model, tick.stage, swash, tick.psi, tick.wind, work, tick.slopes[k], False)
         if method == PARTITIONED and k > 0:
             freeze_forcing(as_records(model.switches)[0], rotors, state, stage, slopes[0], slopes[k])
-    combine(state, slopes, tableau[-1], count, h, stage)
+        if method == ETD:
+            combine(state, slopes, tableau[k + 1 if k + 1 < count else -1], k + 1, h, BODY_SIZE, stage)
+            exponential_stage(rotors, as_records(model.blades), tick.exponential, slopes[k], k, stage)
+    if method != ETD:
+        combine(state, slopes, tableau[-1], count, h, state.shape[0], stage)
     w, a, b, c = stage[3], stage[4], stage[5], stage[6]
     shrink = 1.0 / sqrt(w * w + a * a + b * b + c * c)
     stage[3], stage[4], stage[5], stage[6] = w * shrink, a * shrink, b * shrink, c * shrink
 
 
 @kernel
-def combine(state, slopes, factors, count, h, stage):
-    """Set the stage to the state plus h times a sum of the first slopes; the sum of their factors is returned."""
-    for i in range(state.shape[0]):
-        stage[i] = state[i]
+def node(factors, count):
+    """Where a stage is in its step, as a share of it."""
     ahead = 0.0
+    for m in range(count):
+        ahead += factors[m]
+    return ahead
+
+
+@kernel
+def combine(state, slopes, factors, count, h, size, stage):
+    """Set so many states of the stage to the state plus h times a sum of the first slopes."""
+    for i in range(size):
+        stage[i] = state[i]
     for m in range(count):
         factor = factors[m]
         if factor != 0.0:
             step, slope = h * factor, slopes[m]
-            for i in range(state.shape[0]):
+            for i in range(size):
                 stage[i] = stage[i] + step * slope[i]
-            ahead += factor
-    return ahead
 
 
 @kernel

@@ -4,6 +4,7 @@ A record holds values of n aircraft side by side, see `sbs_sim.lanes.memory`. Wh
 n where the lanes are flights, more where a single flight has its blades for lanes.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -267,6 +268,98 @@ def make_work(model: Model) -> Work:
     )
 
 
+class Exponential(NamedTuple):
+    """Coefficients and memory of the exponential method, in blocks of states that belong together.
+
+    A register holds one state of all flights, or several states of a single one.
+
+    Attributes
+    ----------
+    places, positions : ndarray of int64, shape (k,)
+        Of the rotors' states: in the state, and in the blocks.
+    sizes, starts : ndarray of int64, shape (blocks,)
+        States of each block, and the position of its first one.
+    registers : ndarray of int64, shape (blocks + 1,)
+        The first of each block.
+    matrices : ndarray, shape (10, numbers, width)
+        See `sbs_sim.model.exponential.coefficients`; for each register the columns of its block one after the other.
+    begin, end : ndarray, shape (positions, n)
+        States at the beginning of a step, and at a stage.
+    begin_registers, end_registers : ndarray, shape (registers, width)
+        The same memory.
+    slopes : ndarray, shape (4, positions, n)
+        Derivatives at the stages.
+    """
+
+    places: IntArray
+    positions: IntArray
+    sizes: IntArray
+    starts: IntArray
+    registers: IntArray
+    matrices: Array
+    begin: Array
+    end: Array
+    begin_registers: Array
+    end_registers: Array
+    slopes: Array
+
+
+def make_exponential(
+    blocks: Sequence[Sequence[int]], coefficients: Sequence[Sequence[Array]], width: int
+) -> Exponential:
+    """Coefficients of flights side by side, `width` of them, or of a single one.
+
+    Parameters
+    ----------
+    blocks : sequence of sequences of int
+        Places of states that belong together.
+    coefficients : sequence of sequences of ndarray, shape (10, m, m)
+        Of each flight and each block.
+    width : int
+        Lanes of a register.
+    """
+    n = len(coefficients)
+    each = width // n  # states in a register
+    sizes = np.array([len(block) for block in blocks], dtype=np.int64)
+    registers = np.cumsum([0, *(-(-sizes // each))]).astype(np.int64)
+    starts = registers[:-1] * each
+    within = [start + np.arange(size) for start, size in zip(starts, sizes, strict=True)]
+    padded = int(registers[-1]) * each
+    begin, end = aligned((padded, n), float), aligned((padded, n), float)
+    return Exponential(
+        places=_joined(blocks),
+        positions=_joined(within),
+        sizes=sizes,
+        starts=starts,
+        registers=registers,
+        matrices=_by_registers(coefficients, each),
+        begin=begin,
+        end=end,
+        begin_registers=begin.reshape(-1, width),
+        end_registers=end.reshape(-1, width),
+        slopes=aligned((4, padded, n), float),
+    )
+
+
+def _joined(parts: Sequence[Any]) -> IntArray:
+    return np.concatenate([np.zeros(0, dtype=np.int64), *parts]).astype(np.int64)
+
+
+def _by_registers(coefficients: Sequence[Sequence[Array]], each: int) -> Array:
+    """Columns of all blocks, cut into registers of so many states of each flight."""
+    found = []
+    for own in zip(*coefficients, strict=True):
+        columns = np.stack(own, axis=-1).transpose(0, 2, 1, 3)  # coefficient, column, row, flight
+        count, m, _, n = columns.shape
+        rows = np.zeros((count, m, -(-m // each) * each, n))
+        rows[:, :, :m] = columns
+        found.append(rows.reshape(count, m, -1, each * n).transpose(0, 2, 1, 3).reshape(count, -1, each * n))
+    made = aligned((10, sum(part.shape[1] for part in found), each * len(coefficients)), float)
+    if found:
+        made[:] = np.concatenate(found, axis=1)
+    return made
+
+
 class Tick(NamedTuple):
     """Memory of a tick.
 
@@ -284,6 +377,8 @@ class Tick(NamedTuple):
         The state that ended a flight.
     done : ndarray of int64, shape (n,)
         Steps of the tick.
+    exponential : Exponential
+        Without blocks for other methods.
     """
 
     stage: Array
@@ -293,9 +388,10 @@ class Tick(NamedTuple):
     deepest: Array
     last: Array
     done: IntArray
+    exponential: Exponential
 
 
-def make_tick(work: Work, stages: int) -> Tick:
+def make_tick(work: Work, stages: int, exponential: Exponential) -> Tick:
     """Memory of ticks of a method with so many stages."""
     size, n = work.state.shape[0] - 1, work.state.shape[1]
     rotors = len(work.flow)
@@ -307,4 +403,5 @@ def make_tick(work: Work, stages: int) -> Tick:
         deepest=aligned((1, n), float),
         last=aligned((size, n), float),
         done=np.zeros(n, dtype=np.int64),
+        exponential=exponential,
     )

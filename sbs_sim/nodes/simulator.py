@@ -26,7 +26,7 @@ from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
 from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS, Component, Parameter, declare, heed, run
 from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.nodes.recording import Recording
-from sbs_sim.simulation import Simulation, trimmed_state
+from sbs_sim.simulation import AZIMUTH_STEP_DEG, METHOD, METHODS, Simulation, trimmed_state
 
 OFF = "off"
 # How long a thread keeps the interpreter while the flight waits for it [s]; the 5 ms of Python are half a tick.
@@ -48,7 +48,8 @@ PARAMETERS = {
         1.0, "Simulation time over wall time; 0 is as fast as possible", 0.0, 1000.0, fixed=False
     ),
     "publish_rate": Parameter(100.0, "Ticks, and messages on every state topic, per simulated second [Hz]", 1.0, 1e4),
-    "azimuth_step_deg": Parameter(5.0, "Largest step of the fastest rotor's azimuth [deg]", 0.01, 45.0),
+    "method": Parameter(METHOD, f"Integration: {', '.join(METHODS)}"),
+    "azimuth_step_deg": Parameter(AZIMUTH_STEP_DEG, "Largest step of the fastest rotor's azimuth [deg]", 0.01, 45.0),
     "lead_lag": Parameter(True, "Blades lead and lag"),
     "cyclic_inflow": Parameter(True, "Inflow has its sine and cosine parts"),
     "command_timeout": Parameter(
@@ -113,6 +114,7 @@ class Simulator(Component):
             trimmed_state(self.aircraft, point, position, values["heading"], wind.velocity),
             point.swashplate,
             tick=1.0 / values["publish_rate"],
+            method=values["method"],
             azimuth_step=math.radians(values["azimuth_step_deg"]),
             wind=wind,
             ground_altitude=values["ground_altitude"],

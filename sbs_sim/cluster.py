@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import ClusterError, SbsError
-from sbs_sim.model.kernel_cache import digest_of
-from sbs_sim.versions import in_words, versions
+from sbs_sim.versions import in_words, source_digest, versions
 
 if TYPE_CHECKING:
     import distributed
@@ -151,7 +150,7 @@ def _folder(contents: bytes) -> "tempfile.TemporaryDirectory[str]":
 
 @functools.cache
 def _versions() -> dict[str, str]:
-    """What decides the bits of trims, linear models and flights."""
+    """What decides the bits of trims, linear models and flights; the processor does not."""
     package = Path(__file__).parent
-    digest = digest_of(path for pattern in SOURCES for path in package.glob(pattern))
+    digest = source_digest(path for pattern in SOURCES for path in package.glob(pattern))
     return {**versions(), "scipy": importlib.metadata.version("scipy"), "sources": digest}

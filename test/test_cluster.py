@@ -121,8 +121,7 @@ def test_commands_print_the_same_with_a_cluster(address):
     ("other", "said"),
     [
         ({"numba": "0.1"}, "numba: 0.1 where it is asked, {numba} here"),
-        ({"target": "generic"}, "target: generic where it is asked, {target} here"),
-        ({"target_features": "b,d,a,c,e"}, "target_features: a, b, c and 2 more only where it is asked, "),
+        ({"sources": "0"}, "sources: 0 where it is asked, {sources} here"),
     ],
 )
 def test_a_worker_with_other_versions_is_refused_by_name(address, other, said):

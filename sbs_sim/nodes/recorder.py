@@ -18,7 +18,7 @@ from sbs_sim.errors import RecordingError
 from sbs_sim.recording import LogWriter, message_definition, qos_profiles, type_hash
 from sbs_sim.recording.flight import attachments, simulation_metadata
 from sbs_sim.simulation import Simulation
-from sbs_sim.versions import versions
+from sbs_sim.versions import surroundings, versions
 
 LONGEST_NAME = 60  # characters of the aircraft's that go into the file's
 RCLPY_OF = {"3": "humble", "4": "iron", "7": "jazzy", "9": "kilted"}  # distributions by the first number of its version
@@ -52,7 +52,7 @@ class Recorder:
             wall_start=round(begin.timestamp() * 1e9),
             metadata={
                 "simulation": simulation_metadata(simulation),
-                "versions": own_versions,
+                "versions": {**own_versions, **surroundings()},
                 "parameters": {name: repr(value) for name, value in parameters.items()},
             },
             attachments=attachments(simulation.aircraft),

@@ -33,8 +33,8 @@ OPTIONS = {"tick": float, "azimuth_step": float, "lead_lag": bool, "cyclic_inflo
 GROUND = "ground_altitude"  # an option too; older logs have none
 WIND_VECTORS = ("velocity", "gust", "turbulence_intensity")
 WIND_NUMBERS = ("gust_delay", "gust_duration", "turbulence_length", "turbulence_airspeed", "turbulence_direction")
-# Other machine code rounds otherwise, and the rotors' fast modes carry that along: what may then differ, relative to
-# the largest magnitude of each state in the flight.
+# Another version of the model may round otherwise, and the rotors' fast modes carry that along: what may then differ,
+# relative to the largest magnitude of each state in the flight. Another processor or compilation rounds alike.
 TOLERANCE = 1e-6
 LATEST_STATE = 10**17  # ns, three years of flight
 LONGEST_GAP = 1e4  # s without a state; to fly through a damaged time would take for ever
@@ -109,7 +109,7 @@ class Verification:
 
     @property
     def within_tolerance(self) -> bool:
-        """True if no state differs by more than what other machine code may do."""
+        """True if no state differs by more than what other rounding may do."""
         return self.largest is None or self.largest.relative <= TOLERANCE
 
     @property

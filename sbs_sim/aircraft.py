@@ -139,7 +139,7 @@ class Rotor(ByContent):
     @property
     def second_moment(self) -> float:
         """A1 of a blade about its flap hinge, m_b L^2 / 3 [kg m^2]."""
-        return self.blade_mass * self.blade_length**2 / 3
+        return self.blade_mass * (self.blade_length * self.blade_length) / 3
 
     def elements(self, count: int) -> Array:
         """Blade elements at their mid-points (theory.md section 4).
@@ -624,7 +624,7 @@ def _digest(digest: Any, name: str, value: Any) -> None:
 def _blades_inertia(rotor: Rotor) -> Array:
     """Inertia about the c.g. of a rotor's undeflected blades, averaged over azimuth [kg m^2], shape (3, 3)."""
     e0 = rotor.hinge_offset
-    polar = rotor.blades * (rotor.blade_mass * e0**2 + 2 * e0 * rotor.first_moment + rotor.second_moment)
+    polar = rotor.blades * (rotor.blade_mass * (e0 * e0) + 2 * e0 * rotor.first_moment + rotor.second_moment)
     axes = hub_axes(rotor.shaft_direction)
     about_hub = polar / 2 * (np.eye(3) + np.outer(axes[:, 2], axes[:, 2]))
     hub, mass = rotor.hub, rotor.blades * rotor.blade_mass

@@ -114,7 +114,7 @@ def _body(aircraft: "Aircraft") -> NDArray[Any]:
 def second_moment(aircraft: "Aircraft", rotor: "Rotor") -> float:
     """A_1 in the equations of a blade [kg m^2]."""
     whole = aircraft.options.flap_inertia == "axis_to_tip"
-    return rotor.blade_mass * rotor.radius**2 / 3 if whole else rotor.second_moment
+    return rotor.blade_mass * (rotor.radius * rotor.radius) / 3 if whole else rotor.second_moment
 
 
 def _blade_values(
@@ -168,7 +168,7 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
     for j, rotor in enumerate(aircraft.rotors):
         tip_speed = rotor.speed * rotor.radius
         # in vacuum the coefficients are zero, not zero over zero
-        pressure = density * math.pi * rotor.radius**2 * tip_speed**2
+        pressure = density * math.pi * (rotor.radius * rotor.radius) * (tip_speed * tip_speed)
         values = {
             "speed": rotor.speed,
             "radius": rotor.radius,

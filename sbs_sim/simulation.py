@@ -30,8 +30,9 @@ from sbs_sim.model import state as S
 from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.frames import down_of, euler_angles, euler_to_quaternion, rotation_matrix, to_body
 from sbs_sim.model.ground import lowest_point
-from sbs_sim.model.integrate import ETD, FLYING, PARTITIONED, RK4, TSIT5, advance
+from sbs_sim.model.integrate import ETD, FLYING, PARTITIONED, RK4, TSIT5, advance, azimuths_at
 from sbs_sim.model.multiblade import blade_matrix
+from sbs_sim.model.solve import length
 from sbs_sim.model.wind import Wind, WindField, winds_at
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
 from sbs_sim.rotor_matrices import RotorMatrices, arranged, rotor_matrices
@@ -144,7 +145,6 @@ class Simulation:
         self.watch = max(1, round(WATCH_PERIOD / tick))
         self.azimuth0 = np.zeros(len(aircraft.rotors))
         self._held = held_states(aircraft, lead_lag, cyclic_inflow)
-        self._speeds = np.array([rotor.speed for rotor in aircraft.rotors])
         self.step = 0
         self.set_wind(Wind() if wind is None else wind)
         self.state = self.checked_state(state)
@@ -224,7 +224,7 @@ class Simulation:
             if not abs(value) <= bound:  # true for a NaN as well
                 raise SimulationError(f"state {name} = {value}: allowed are {-bound:g} to {bound:g}")
         quaternion = values[S.ATTITUDE : S.ATTITUDE + 4]
-        norm = math.sqrt(sum(float(part) * float(part) for part in quaternion))
+        norm = length(quaternion)
         if not 0.5 <= norm <= 2.0:
             raise SimulationError(f"state attitude has a norm of {norm:g}: allowed are 0.5 to 2, a unit quaternion")
         if abs(norm - 1.0) > UNIT:  # what has been normalised once stays as it is, bit for bit
@@ -341,8 +341,10 @@ class Simulation:
 
     def azimuths(self, steps: NDArray[np.int64]) -> Array:
         """Azimuth of every rotor at steps, shape (n, n_rotors) [rad], 0 to 2 pi."""
-        turned: Array = self.azimuth0 + self._speeds * (self.step_size * steps[:, np.newaxis])
-        return turned % (2 * math.pi)
+        angles = np.empty((len(steps), len(self.azimuth0), 1))
+        times = np.multiply(steps, self.step_size, dtype=float)
+        azimuths_at(self.model.rotors, _single(self.azimuth0), times, angles)
+        return angles[..., 0]
 
     def snapshot(self) -> Snapshot:
         """The present instant, with loads and accelerations under the swashplate angles now in force."""

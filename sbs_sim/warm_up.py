@@ -2,6 +2,8 @@
 
 import shutil
 
+from numba import config
+
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.trim import trim
@@ -12,6 +14,8 @@ from sbs_sim.simulation import Simulation, simulate, trimmed_state
 
 def main() -> None:
     """Use every entry once, which compiles it, and delete the machine code of earlier sources."""
+    if config.DISABLE_JIT:  # the interpreter would take half an hour, and keep nothing
+        return
     aircraft = Aircraft.load("sbs")
     hover = trim(aircraft)
     simulate(aircraft, hover, hover.controls, duration=0.01, wind=Wind(turbulence_intensity=(1.0, 1.0, 1.0)))

@@ -28,8 +28,9 @@ from sbs_sim.errors import LinearizationError
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
+from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
-from sbs_sim.model.solve import solve
+from sbs_sim.model.solve import length, product, solve
 
 Array = NDArray[np.float64]
 
@@ -162,8 +163,8 @@ class LinearModel(ByContent):
             self,
             a=reduced_a,
             b=reduced_b,
-            c=self.c[:, slow] + self.c[:, fast] @ by_state,
-            d=self.d + self.c[:, fast] @ by_control,
+            c=self.c[:, slow] + product(self.c[:, fast], by_state),
+            d=self.d + product(self.c[:, fast], by_control),
             state_names=tuple(kept),
             state_units=tuple(self.state_units[i] for i in slow),
             steps=self.steps[[*slow, *controls]],
@@ -349,7 +350,8 @@ def settle(a: Array, b: Array, slow: Sequence[int]) -> tuple[Array, Array, Array
         raise LinearizationError("the states that are not kept do not settle: their matrix is singular") from None
     by_state, by_control = settled[:, : len(slow)], settled[:, len(slow) :]
     coupling = a[np.ix_(slow, fast)]
-    return a[np.ix_(slow, slow)] + coupling @ by_state, b[slow] + coupling @ by_control, by_state, by_control
+    reduced = a[np.ix_(slow, slow)] + product(coupling, by_state)
+    return reduced, b[slow] + product(coupling, by_control), by_state, by_control
 
 
 def difference_steps(aircraft: Aircraft, scale: float = 1.0) -> Array:
@@ -453,8 +455,8 @@ def _relative_spread(departures: Array, mean: Array, weights: Array) -> float:
     """See `LinearModel.azimuth_spread`; weights, shape (n, n), measure every state in its step."""
     if len(departures) == 1:
         return math.nan
-    squares = np.einsum("kij,kij,ij->k", departures, departures, weights**2)
-    return float(math.sqrt(squares.max()) / np.linalg.norm(mean * weights))
+    squares = ((departures * weights) ** 2).sum(axis=(1, 2))
+    return math.sqrt(squares.max()) / length((mean * weights).ravel())
 
 
 def _outputs(aircraft: Aircraft, point: TrimPoint, mean: Array) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
@@ -473,13 +475,14 @@ def _outputs(aircraft: Aircraft, point: TrimPoint, mean: Array) -> tuple[Array, 
 
 def _climb_row(point: TrimPoint, inputs: int) -> Array:
     """Derivative of the climb rate u sin theta - (v sin phi + w cos phi) cos theta."""
-    u, w, _, theta, v, _, phi, _ = point.state[: S.LINEAR_BODY_SIZE]
+    u, w, _, theta, v, _, phi, _ = point.state[: S.LINEAR_BODY_SIZE].tolist()
     row = np.zeros(inputs)
-    row[S.LINEAR_U] = math.sin(theta)
-    row[S.LINEAR_V] = -math.sin(phi) * math.cos(theta)
-    row[S.LINEAR_W] = -math.cos(phi) * math.cos(theta)
-    row[S.LINEAR_THETA] = u * math.cos(theta) + (v * math.sin(phi) + w * math.cos(phi)) * math.sin(theta)
-    row[S.LINEAR_PHI] = (w * math.sin(phi) - v * math.cos(phi)) * math.cos(theta)
+    (ct, st), (cp, sp) = cosine_and_sine(theta), cosine_and_sine(phi)
+    row[S.LINEAR_U] = st
+    row[S.LINEAR_V] = -sp * ct
+    row[S.LINEAR_W] = -cp * ct
+    row[S.LINEAR_THETA] = u * ct + (v * sp + w * cp) * st
+    row[S.LINEAR_PHI] = (w * sp - v * cp) * ct
     return row
 
 
@@ -502,9 +505,9 @@ def kinematics(state: Array, inertia: Array, gravity: float) -> Array:
     -------
     ndarray, shape (8, 8)
     """
-    u, w, q, theta, v, p, phi, r = state[: S.LINEAR_BODY_SIZE]
+    u, w, q, theta, v, p, phi, r = np.asarray(state, dtype=float)[: S.LINEAR_BODY_SIZE].tolist()
     g = gravity
-    st, ct, sp, cp = math.sin(theta), math.cos(theta), math.sin(phi), math.cos(phi)
+    (ct, st), (cp, sp) = cosine_and_sine(theta), cosine_and_sine(phi)
     velocity, rates = np.array([u, v, w]), np.array([p, q, r])
     axis = [S.LINEAR_U, S.LINEAR_V, S.LINEAR_W]
     turn = [S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]
@@ -513,13 +516,14 @@ def kinematics(state: Array, inertia: Array, gravity: float) -> Array:
     a[np.ix_(axis, turn)] = _cross(velocity)
     a[axis, S.LINEAR_THETA] = -g * ct, -g * sp * st, -g * cp * st
     a[axis, S.LINEAR_PHI] = 0.0, g * cp * ct, -g * sp * ct
-    gyroscopic = _cross(rates) @ inertia - _cross(inertia @ rates)
+    momentum = product(inertia, rates[:, np.newaxis])[:, 0]
+    gyroscopic = product(_cross(rates), inertia) - _cross(momentum)
     a[np.ix_(turn, turn)] = -solve(inertia, gyroscopic)
     heading = q * sp + r * cp  # psi' cos theta
     a[S.LINEAR_THETA, [S.LINEAR_Q, S.LINEAR_R]] = cp, -sp
     a[S.LINEAR_THETA, S.LINEAR_PHI] = -heading
     a[S.LINEAR_PHI, turn] = 1.0, sp * st / ct, cp * st / ct
-    a[S.LINEAR_PHI, S.LINEAR_THETA] = heading / ct**2
+    a[S.LINEAR_PHI, S.LINEAR_THETA] = heading / (ct * ct)
     a[S.LINEAR_PHI, S.LINEAR_PHI] = (q * cp - r * sp) * st / ct
     return a
 

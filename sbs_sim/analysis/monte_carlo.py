@@ -17,6 +17,7 @@ from sbs_sim.batch import Batch, Case, percentiles
 from sbs_sim.errors import BatchError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
+from sbs_sim.model.noise import normal
 from sbs_sim.model.wind import Wind
 
 Array = NDArray[np.float64]
@@ -77,15 +78,17 @@ def gust_cases(
     airspeed = checks.number("airspeed", condition.get("airspeed", 0.0), -most, most, unit, BatchError)
     cases = []
     for i in range(flights):
-        random = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, i])))
+        source = np.random.PCG64(np.random.SeedSequence([seed, i]))
         wind = Wind(
             turbulence_intensity=(turbulence, turbulence, turbulence),
             turbulence_length=length,
             turbulence_airspeed=max(abs(airspeed), LEAST_AIRSPEED),
             turbulence_direction=condition.get("sideslip", 0.0),
-            turbulence_seed=int(random.integers(2**63)),
+            turbulence_seed=source.random_raw() >> 1,
         )
-        changes = {path: mean * (1.0 + share * random.standard_normal()) for path, (mean, share) in centres.items()}
+        numbers = normal(source, -(-len(centres) // 2)).ravel().tolist()
+        scattered = zip(centres.items(), numbers, strict=False)
+        changes = {path: mean * (1.0 + share * number) for (path, (mean, share)), number in scattered}
         cases.append(Case(aircraft, dict(condition), wind=wind, changes=changes))
     return cases
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sbs_sim import interruption
 from sbs_sim.content import ByContent
-from sbs_sim.model.solve import smallest, solve
+from sbs_sim.model.solve import length, smallest, solve
 
 Array = NDArray[np.float64]
 Equations = Callable[[Array], Array]
@@ -108,11 +108,11 @@ def _descend(
     equations: Equations, values: Array, step: Array, residual: Array, halvings: int
 ) -> tuple[Array, Array] | None:
     """Unknowns and residual after the longest of the steps 1, 1/2, 1/4 ... that lessens it; None if none does."""
-    size = np.linalg.norm(residual)
+    size = length(residual)
     for halving in range(halvings):
         candidate = values - step / 2**halving
         if np.abs(candidate).max() < LARGEST_UNKNOWN:
             new = equations(candidate)
-            if np.linalg.norm(new) < size:  # false for a NaN as well
+            if length(new) < size:  # false for a NaN as well
                 return candidate, new
     return None

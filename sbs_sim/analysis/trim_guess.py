@@ -19,6 +19,7 @@ from sbs_sim.content import ByContent
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.airfoil import AirfoilTable
+from sbs_sim.model.solve import smallest
 
 Array = NDArray[np.float64]
 
@@ -381,7 +382,7 @@ class _Search:
         self._authority = slopes[2:] * self._scale[:, None]
         left[2] = up @ left[:3] - self._weight
         wanted = -left[2:] * self._scale
-        change = np.asarray(np.linalg.lstsq(self._authority, wanted, rcond=WEAKEST)[0], dtype=np.float64)
+        change = smallest(self._authority, wanted, WEAKEST)
         most = float(np.abs(change).max())
         return change if self._first or most <= LARGEST_STEP else change * (LARGEST_STEP / most)
 

@@ -278,7 +278,7 @@ class TrimProblem:
         gravity = max(self.aircraft.environment.gravity, 1.0)
         scales = np.full(self.layout.size, gravity)
         for j, rotor in enumerate(self.aircraft.rotors):
-            scales[self.layout.flap_rate(j)] = scales[self.layout.lag_rate(j)] = rotor.speed**2
+            scales[self.layout.flap_rate(j)] = scales[self.layout.lag_rate(j)] = rotor.speed * rotor.speed
             scales[self.layout.inflow(j)] = rotor.speed
         return scales[self.equations]
 

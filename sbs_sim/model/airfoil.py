@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim.content import ByContent
 from sbs_sim.errors import AirfoilError
+from sbs_sim.model.elementary import cosine_and_sine
 
 Array = NDArray[np.float64]
 
@@ -134,13 +135,16 @@ def viterna(
     is_reversed = magnitude > np.pi / 2
     folded = np.where(is_reversed, np.pi - magnitude, magnitude)
     stalled = np.maximum(folded, alpha_stall)
-    sine, cosine = np.sin(stalled), np.cos(stalled)
-    sine_s, cosine_s = math.sin(alpha_stall), math.cos(alpha_stall)
+    # rounded right: the aircraft is the same on every machine, and known again by its hash
+    cosine, sine = (
+        np.reshape(part, stalled.shape) for part in zip(*map(cosine_and_sine, stalled.ravel()), strict=True)
+    )
+    cosine_s, sine_s = cosine_and_sine(alpha_stall)
     cd_max = PLATE_DRAG + PLATE_DRAG_SLOPE * min(aspect_ratio, INFINITE_BLADE)
-    a2 = (cl_stall - cd_max * sine_s * cosine_s) * sine_s / cosine_s**2
-    b2 = (cd_stall - cd_max * sine_s**2) / cosine_s
-    cl = cd_max * sine * cosine + a2 * cosine**2 / sine
-    cd = cd_max * sine**2 + b2 * cosine
+    a2 = (cl_stall - cd_max * sine_s * cosine_s) * sine_s / (cosine_s * cosine_s)
+    b2 = (cd_stall - cd_max * (sine_s * sine_s)) / cosine_s
+    cl = cd_max * sine * cosine + a2 * (cosine * cosine) / sine
+    cd = cd_max * (sine * sine) + b2 * cosine
     cl = np.where(is_reversed, REFLECTED_LIFT * cl * folded / stalled, cl)
     return np.sign(alpha) * cl, cd
 
@@ -177,7 +181,7 @@ def extend_polar(alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: f
     # The two sides of a cambered airfoil would meet at 180 deg with unequal drag: pass from one to the other.
     past_180 = np.where(circle > 0, circle - np.pi, circle + np.pi)
     unstalled = (np.abs(circle) > np.pi / 2) & (past_180 > -high) & (past_180 < low)
-    circle_cd[unstalled] = np.interp(past_180[unstalled], [-high, low], [cd[-1], cd[0]])
+    circle_cd[unstalled] = cd[-1] + (past_180[unstalled] + high) * ((cd[0] - cd[-1]) / (low + high))
     return circle, circle_cl, circle_cd
 
 

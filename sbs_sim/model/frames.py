@@ -42,22 +42,21 @@ def _quaternion_of(angles, like, out):
 
 def quaternion_to_euler(quaternion: ArrayLike) -> tuple[float, float, float]:
     """Yaw, pitch, roll [rad] of a unit quaternion (w, x, y, z); pitch within +-pi/2."""
-    angles = np.empty((3, 1))
-    _angles_of(np.array(quaternion, dtype=float).reshape(4, 1), ONE, angles)
-    yaw, pitch, roll = angles[:, 0].tolist()
+    yaw, pitch, roll = euler_angles(np.array(quaternion, dtype=float).reshape(1, 4))[0].tolist()
     return yaw, pitch, roll
 
 
 @entry
 def _angles_of(quaternions, like, out):
-    """Yaw, pitch and roll, shape (3, n), of quaternions, (4, n); `like` are records of n lanes."""
+    """Yaw, pitch and roll, shape (m, 3, n), of quaternions, (m, 4, n); `like` are records of n lanes."""
     records = as_records(like)
     given, angles = as_lanes(quaternions, records), as_lanes(out, records)
-    w, x, y, z = given[0], given[1], given[2], given[3]
-    sine = least(greatest(2.0 * (w * y - z * x), -1.0), 1.0)
-    angles[0] = direction(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    angles[1] = angle_of(sine, sqrt(1.0 - sine * sine), 1.0)
-    angles[2] = direction(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    for i in range(given.shape[0]):
+        w, x, y, z = given[i, 0], given[i, 1], given[i, 2], given[i, 3]
+        sine = least(greatest(2.0 * (w * y - z * x), -1.0), 1.0)
+        angles[i, 0] = direction(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        angles[i, 1] = angle_of(sine, sqrt(1.0 - sine * sine), 1.0)
+        angles[i, 2] = direction(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
 
 
 @kernel
@@ -68,11 +67,10 @@ def direction(y, x):
 
 def euler_angles(quaternions: Array) -> Array:
     """Yaw, pitch, roll [rad], shape (n, 3), of unit quaternions (w, x, y, z), shape (n, 4); pitch within +-pi/2."""
-    w, x, y, z = np.asarray(quaternions).T
-    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
-    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    return np.stack([yaw, pitch, roll], axis=1)
+    given = np.array(quaternions, dtype=float, order="C").reshape(-1, 4)
+    angles = np.empty((len(given), 3))
+    _angles_of(given[..., np.newaxis], ONE, angles[..., np.newaxis])
+    return angles
 
 
 def down_of(quaternions: Array) -> Array:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sbs_sim.lanes import all_lanes, any_lane, as_lanes, as_records, floor, sqrt
+from sbs_sim.lanes import all_lanes, any_lane, as_lanes, as_records, floor, greatest, least, sqrt
 from sbs_sim.model.exponential import begin_exponential_step, exponential_stage
 from sbs_sim.model.ground import lowest
 from sbs_sim.model.kernel import entry, kernel
@@ -145,7 +145,28 @@ def set_azimuths(rotors, start, time, psi):
     """Azimuths of all rotors a time after step 0, within 0 and 2 pi."""
     for j in range(rotors.shape[0]):
         angle = start[j] + rotors[j].speed * time
-        psi[j] = angle - TURN * floor(angle * INVERSE_TURN)
+        # the whole turns are rounded too: what is left may be beyond an end by a last bit of the angle
+        psi[j] = least(greatest(angle - TURN * floor(angle * INVERSE_TURN), 0.0), TURN)
+
+
+@entry
+def azimuths_at(rotors, start, times, out):
+    """What `set_azimuths` gives at some times.
+
+    Parameters
+    ----------
+    rotors : structured ndarray, shape (n_rotors,)
+    start : ndarray, shape (n_rotors, n)
+        Azimuths at step 0 [rad].
+    times : ndarray, shape (m,)
+        Since step 0 [s].
+    out : ndarray, shape (m, n_rotors, n)
+        Output [rad].
+    """
+    records = as_records(rotors)
+    first, found = as_lanes(start, records), as_lanes(out, records)
+    for i in range(times.size):
+        set_azimuths(records, first, times[i], found[i])
 
 
 @kernel

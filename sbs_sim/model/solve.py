@@ -71,6 +71,25 @@ def eliminate(matrix, sides):
     return True
 
 
+def product(left: Array, right: Array) -> Array:
+    """The matrix left @ right, (n, k) times (k, m): every element the sum in order of rounded products.
+
+    For small matrices; what BLAS adds up first is the processor's choice.
+    """
+    total = np.zeros((len(left), right.shape[1]))
+    for column, row in zip(left.T, right, strict=True):
+        total += column[:, np.newaxis] * row
+    return total
+
+
+def length(vector: Array) -> float:
+    """Euclidean length, the squares summed in order."""
+    total = 0.0
+    for part in vector.tolist():
+        total += part * part
+    return math.sqrt(total)
+
+
 def smallest(matrix: Array, right: Array, share: float) -> Array:
     """The smallest y that leaves least of matrix @ y - right, where singular values may vanish.
 

@@ -253,6 +253,6 @@ def _noise_of_step(ratio: float) -> tuple[float, float, float]:
     decay = exponential(-2.0 * ratio)
     first = -exponential_less_one(-2.0 * ratio) / 2.0
     mixed = (1.0 - decay * (1.0 + 2.0 * ratio)) / 4.0
-    second = (1.0 - decay * (1.0 + 2.0 * ratio + 2.0 * ratio**2)) / 4.0
-    rest = max(0.0, second - mixed**2 / first)
+    second = (1.0 - decay * (1.0 + 2.0 * ratio + 2.0 * (ratio * ratio))) / 4.0
+    rest = max(0.0, second - mixed * mixed / first)
     return math.sqrt(first), mixed / math.sqrt(first), math.sqrt(rest)

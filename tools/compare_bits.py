@@ -85,6 +85,7 @@ def main() -> int:
     parser.add_argument("--aircraft", nargs="+", help="names or files (default: all of the tests)")
     parser.add_argument("--small", action="store_true", help="so little that the interpreter can do it, too")
     parser.add_argument("--most", type=int, help="no more than so many digests of an aircraft (default: all)")
+    parser.add_argument("--kept", action="store_true", help='"native" is what the machine code that is kept gives')
     parser.add_argument("--print", action="store_true", help="print the digests of this process")
     options = parser.parse_args()
     names = options.aircraft or (SMALL if options.small else AIRCRAFT)
@@ -98,7 +99,7 @@ def main() -> int:
     arguments += [] if options.most is None else ["--most", str(options.most)]
     ways = [way for way in options.ways if NEEDS.get(way, "") in ("", *own_features())]
     with tempfile.TemporaryDirectory() as folder:
-        found = {way: _of_process(way, Path(folder), arguments) for way in ways}
+        found = {way: _of_process(way, Path(folder), arguments, options.kept) for way in ways}
     return int(_told(found))
 
 
@@ -182,10 +183,12 @@ def own_features() -> set[str]:
     return {name for name, has in binding.get_host_cpu_features().items() if has}
 
 
-def _of_process(way: str, folder: Path, arguments: list[str]) -> dict[str, str]:
+def _of_process(way: str, folder: Path, arguments: list[str], kept: bool) -> dict[str, str]:
     """Digests by their titles; they are told as soon as they are there."""
     variables = {"NUMBA_OPT": "3", **WAYS[way]}
-    variables["NUMBA_CACHE_DIR"] = str(folder / (way if variables.pop(OWN, None) is not None else "native"))
+    anew = way if variables.pop(OWN, None) is not None else "native"
+    if anew != "native" or not kept:
+        variables["NUMBA_CACHE_DIR"] = str(folder / anew)
     begin = time.monotonic()
     command = [sys.executable, __file__, "--print", *arguments]
     environment = {**os.environ, **variables}

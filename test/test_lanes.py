@@ -184,6 +184,75 @@ def test_quotients_and_roots_are_rounded_once():
     assert alike(results, [math.sqrt(a) if a >= 0 else math.nan for (a,) in arguments])
 
 
+EXACT_OTHERS = {
+    "floor": (lambda a: floor(a), lambda a: math.floor(a)),
+    "least": (lambda a, b: least(a, b), min),
+    "greatest": (lambda a, b: greatest(a, b), max),
+    "abs": (lambda a: abs(a), abs),
+    "select": (lambda a, b, c: select(a < b, b, c), lambda a, b, c: b if a < b else c),
+    "a b c": (lambda a, b, c: a * b * c, None),
+    "a b / c": (lambda a, b, c: a * b / c, None),
+}
+
+
+def rational(value):
+    """Fraction of a double that is finite."""
+    return Fraction(float(value))
+
+
+@pytest.mark.parametrize("name", [name for name, (_, exact) in EXACT_OTHERS.items() if exact])
+def test_what_rounds_nothing_is_exact(name):
+    function, exact = EXACT_OTHERS[name]
+    arguments, results = both(function, function.__code__.co_argcount)
+    finite = np.isfinite(arguments).all(axis=1)
+    for row, result in zip(arguments[finite], results[finite], strict=True):
+        assert rational(result) == exact(*map(rational, row)), row
+
+
+@pytest.mark.parametrize("divided", [False, True])
+def test_a_product_that_goes_on_is_rounded_first(divided):
+    function = EXACT_OTHERS["a b / c" if divided else "a b c"][0]
+    arguments, results = both(function, 3)
+    finite = np.isfinite(arguments).all(axis=1)
+    for (a, b, c), result in zip(arguments[finite], results[finite], strict=True):
+        first = exactly(rational(a) * rational(b))
+        if math.isfinite(first) and (c or not divided):
+            second = rational(first) / rational(c) if divided else rational(first) * rational(c)
+            assert result == exactly(second)
+
+
+def test_what_is_not_a_number_stays_in_its_lane_and_no_comparison_is_true_of_it():
+    def compared(a, b):
+        found = select(a < b, 1.0, 0.0) + select(a <= b, 2.0, 0.0)
+        return found + select(a > b, 4.0, 0.0) + select(a >= b, 8.0, 0.0) + select(~(a < b), 16.0, 0.0)
+
+    arguments, results = both(compared, 2)
+    strange = np.isnan(arguments).any(axis=1)
+    assert strange.any()
+    assert (results[strange] == 16.0).all()
+    for function in (lambda a, b: a + b, lambda a, b: a * b - 1.0, lambda a, b: sqrt(abs(a)) / b):
+        arguments, results = both(function, 2)
+        assert np.isnan(results[np.isnan(arguments).any(axis=1)]).all()
+        ordinary = (np.abs(arguments) < 1e100).all(axis=1) & (np.abs(arguments) > 1e-100).all(axis=1)
+        assert ordinary.any()
+        assert np.isfinite(results[ordinary]).all()
+
+
+def test_zeros_keep_the_signs_of_the_standard():
+    """IEEE 754, section 6.3: an exact sum of zero is positive, but for two negative zeros."""
+    cases = np.array(list(itertools.product([0.0, -0.0, 1.0, -1.0], repeat=3)))
+    for function, exact in (
+        (lambda a, b, c: a + b, lambda a, b, c: a + b),
+        (lambda a, b, c: a - b, lambda a, b, c: a - b),
+        (lambda a, b, c: a * b + c, lambda a, b, c: a * b + c),  # these products are exact
+        (lambda a, b, c: c - a * b, lambda a, b, c: c - a * b),
+        (lambda a, b, c: with_sign(a, b), lambda a, b, c: math.copysign(a, b)),
+    ):
+        result = np.empty((len(cases), 1))
+        compiled(function, 3)(cases[:, :, None], result, LIKE[1])
+        assert alike(result[:, 0], [exact(*map(float, case)) for case in cases])
+
+
 def test_the_first_argument_survives_what_is_not_a_number():
     nan, one = Lanes([math.nan, 1.0]), Lanes([1.0, math.nan])
     for function in (least, greatest):
@@ -480,7 +549,7 @@ DIGEST = """
 TARGETS = [
     {},
     {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": ""},
-    {"NUMBA_CPU_NAME": "generic"},  # without fused multiplication in hardware
+    {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""},  # without fused multiplication in hardware
     {"NUMBA_OPT": "0"},
 ]
 

@@ -3,10 +3,10 @@
     ./run python tools/test_targets.py
     ./run python tools/test_targets.py --targets haswell generic -- test/test_replay.py
 
-A test that passes only where it was written depends on the rounding of one compilation target. A target is a name that
-LLVM knows. `NUMBA_CPU_FEATURES` is empty then: the name alone would keep the features of this machine, and the suite
-would pass for the wrong reason. This machine must be able to execute what is compiled. The exit code is 1 if a test
-fails.
+The model's bits are the same for all of them (`tools/compare_bits.py`), so what fails here hangs on a library, or is a
+fault of ours. A target is a name that LLVM knows. `NUMBA_CPU_FEATURES` is empty then: the name alone would keep the
+features of this machine, and the suite would pass for the wrong reason. This machine must be able to execute what is
+compiled. The exit code is 1 if a test fails.
 """
 
 import argparse

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,10 +117,10 @@ def modes(a: Array, state_names: Sequence[str]) -> tuple[Mode, ...]:
     ValueError
         A name that no linear state has, or not one name for each state.
     """
-    _parts(a, state_names)
+    _check_shape(a, state_names)
     states = _states(tuple(state_names))
     speeds = {rotor: _speed(a, states, rotor) for rotor in states.sizes}
-    named = _named(_unnamed(a, state_names), speeds, states)
+    named = _named(_Found(_unnamed(a, state_names)), speeds, states)
     return tuple(sorted(_unique(named), key=lambda mode: (mode.frequency, mode.name)))
 
 
@@ -160,9 +160,13 @@ def first_matrix_modes(a: Array, state_names: Sequence[str]) -> tuple[Mode, ...]
 # --- eigenvalues and participation ------------------------------------------------------------------------------
 
 
-def _parts(a: Array, state_names: Sequence[str]) -> list[Part]:
+def _check_shape(a: Array, state_names: Sequence[str]) -> None:
     if a.shape != (len(state_names), len(state_names)):
         raise ValueError(f"{len(state_names)} state names for a matrix of shape {a.shape}")
+
+
+def _parts(a: Array, state_names: Sequence[str]) -> list[Part]:
+    _check_shape(a, state_names)
     return [part_of(name) for name in state_names]
 
 
@@ -179,11 +183,9 @@ def _unnamed(a: Array, state_names: Sequence[str]) -> list[Mode]:
     largest = right[np.abs(right).argmax(axis=0), np.arange(len(poles))]
     size = max(float(np.abs(poles).max()), 1.0)
     poles = np.where(np.abs(poles.imag) < 1e-14 * size, poles.real, poles)
-    return [
-        Mode("", complex(poles[i]), right[:, i] / largest[i], shares[:, i])
-        for i in range(len(poles))
-        if poles[i].imag >= 0.0
-    ]
+    kept = np.flatnonzero(poles.imag >= 0.0)
+    vectors, shares = (right / largest).T[kept], shares.T[kept]
+    return [Mode("", *found) for found in zip(poles[kept].tolist(), vectors, shares, strict=True)]
 
 
 def _separate(
@@ -194,12 +196,14 @@ def _separate(
     The eigenvectors of a multiple pole may be any basis of their space. The one taken here diagonalises, within that
     space, a matrix that weighs every kind of state differently, which depends on neither order nor scales.
     """
+    right, left = right.astype(complex), left.astype(complex)
+    alike = np.abs(poles[:, None] - poles) <= ALIKE * float(np.abs(poles).max())
+    left_over = np.flatnonzero(alike.sum(axis=1) > 1).tolist()
+    if not left_over:
+        return right, left
     parts = [part_of(name) for name in state_names]
     kinds = sorted({(part.family, part.harmonic, part.rotor) for part in parts})
     weights = np.array([1.0 + kinds.index((part.family, part.harmonic, part.rotor)) for part in parts])
-    right, left = right.astype(complex), left.astype(complex)
-    alike = np.abs(poles[:, None] - poles) <= ALIKE * float(np.abs(poles).max())
-    left_over = [i for i in range(len(poles)) if alike[i].sum() > 1]
     while left_over:
         cluster = [i for i in left_over if alike[left_over[0], i]]
         left_over = [i for i in left_over if i not in cluster]
@@ -212,6 +216,39 @@ def _separate(
 
 
 # --- what a mode is of ------------------------------------------------------------------------------------------
+
+
+class _Label(NamedTuple):
+    """Name, family and rotors of a mode."""
+
+    name: str
+    family: str
+    rotors: tuple[int, ...] = ()
+
+
+class _Found:
+    """Modes without names.
+
+    Attributes
+    ----------
+    modes : list of Mode
+    participation : ndarray, shape (n_modes, n)
+    rows : list of list of float
+        The same.
+    """
+
+    def __init__(self, modes: list[Mode]) -> None:
+        self.modes = modes
+        self.participation = np.array([mode.participation for mode in modes])
+        self.rows: list[list[float]] = self.participation.tolist()
+
+    def sums(self, places: Indices) -> list[float]:
+        """Share of some states in every mode."""
+        return self.participation.take(places, axis=1).sum(axis=1).tolist()
+
+    def largest(self, places: Indices) -> list[float]:
+        """The largest share of one of some states in every mode."""
+        return self.participation.take(places, axis=1).max(axis=1).tolist()
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,80 +380,101 @@ def _leading(shares: Mapping[Key, float], first: Key) -> list[Key]:
     return sorted((key for key in shares if shares[key] >= limit), key=lambda key: (key != first, -shares[key]))
 
 
-def _choices(mode: Mode, groups: Sequence[_Group], states: _States) -> list[tuple[_Group, float]]:
-    """Groups that a mode may be of, the best one first, with what it has of them relative to that.
+def _choices(found: _Found, groups: Sequence[_Group], states: _States) -> list[list[tuple[_Group, float]]]:
+    """Groups that each mode may be of, the best one first, with what it has of them relative to that.
 
     The family with the largest share, and in it the half of the body with the leading state, or the rotors with the
     largest share. Others that come near remain choices.
     """
-    lead = states.parts[int(mode.participation.argmax())]
-    shares = {family: float(mode.participation[places].sum()) for family, places in states.families.items()}
+    leads = found.participation.argmax(axis=1).tolist()
+    families = {family: found.sums(places) for family, places in states.families.items()}
+    measures = [(found.largest if group.family == "body" else found.sums)(group.states) for group in groups]
+    return [
+        _own_choices(
+            {family: shares[i] for family, shares in families.items()},
+            states.parts[lead].family,
+            [(group, shares[i]) for group, shares in zip(groups, measures, strict=True)],
+        )
+        for i, lead in enumerate(leads)
+    ]
+
+
+def _own_choices(
+    shares: Mapping[str, float], lead: str, measured: Sequence[tuple[_Group, float]]
+) -> list[tuple[_Group, float]]:
+    """Choices of one mode by its shares of the families, the family of its leading state, and what groups measure."""
     found: list[tuple[_Group, float]] = []
-    for family in _leading(shares, lead.family):
-        measure, least = (np.max, NEXT) if family == "body" else (np.sum, LEVEL)
-        own = [(group, float(measure(mode.participation[group.states]))) for group in groups if group.family == family]
+    for family in _leading(shares, lead):
+        least = NEXT if family == "body" else LEVEL
+        own = [choice for choice in measured if choice[0].family == family]
         largest = max(share for _, share in own)
         near = [(group, share / largest) for group, share in own if share >= least * largest]
         found += sorted(near, key=lambda choice: -choice[1])
     return found
 
 
-def _named(found: Sequence[Mode], speeds: Mapping[int, float], states: _States) -> list[Mode]:
+def _named(found: _Found, speeds: Mapping[int, float], states: _States) -> list[Mode]:
     """Every mode with the name that its group gives; of two with one name one takes its next choice if that is free."""
     groups = [*states.halves]
     for rotors in _alike_rotors(speeds, states):
         groups += _rotor_groups(states, rotors)
-    choices = [_choices(mode, groups, states) for mode in found]
+    choices = _choices(found, groups, states)
     chosen = [own[0][0] for own in choices]
-    named = _with_names(found, chosen, speeds, states)
+    labels = _labels(found, chosen, speeds, states)
     others = [(share, i, group) for i, own in enumerate(choices) for group, share in own[1:]]
     for _, i, group in sorted(others, key=lambda other: -other[0]):
-        if len({mode.name for mode in named}) == len(named):
+        if (different := _name_count(labels)) == len(labels):
             break
         trial = [*chosen[:i], group, *chosen[i + 1 :]]
-        again = _with_names(found, trial, speeds, states)
-        if len({mode.name for mode in again}) > len({mode.name for mode in named}):
-            chosen, named = trial, again
-    return named
+        again = _labels(found, trial, speeds, states)
+        if _name_count(again) > different:
+            chosen, labels = trial, again
+    return [_with_label(found.modes[i], label) for i, label in labels.items()]
 
 
-def _with_names(
-    found: Sequence[Mode], chosen: Sequence[_Group], speeds: Mapping[int, float], states: _States
-) -> list[Mode]:
-    """Modes with the names that their groups give."""
-    named: list[Mode] = []
-    for group in dict.fromkeys(chosen):
-        inside = [mode for mode, own in zip(found, chosen, strict=True) if own is group]
+def _name_count(labels: Mapping[int, _Label]) -> int:
+    return len({label.name for label in labels.values()})
+
+
+def _with_label(mode: Mode, label: _Label) -> Mode:
+    return Mode(label.name, mode.pole, mode.vector, mode.participation, label.family, label.rotors)
+
+
+def _labels(found: _Found, chosen: Sequence[_Group], speeds: Mapping[int, float], states: _States) -> dict[int, _Label]:
+    """What the groups of modes call them, by the number of the mode; group after group."""
+    labels: dict[int, _Label] = {}
+    for group in {id(group): group for group in chosen}.values():
+        inside = [i for i, own in enumerate(chosen) if own is group]
         if group.family != "body":
-            named += _name_rotors(inside, group, speeds, states)
+            labels |= zip(inside, _rotor_labels(found, inside, group, speeds, states), strict=True)
             continue
-        names = _lateral_names(inside, states) if group.is_lateral else _longitudinal_names(inside, states)
-        named += [
-            replace(mode, name="heave-yaw" if _is_heave_yaw(mode, states) else name, family="body")
-            for mode, name in zip(inside, names, strict=True)
-        ]
-    return named
+        names = (_lateral_names if group.is_lateral else _longitudinal_names)(found, inside, states)
+        for i, name in zip(inside, names, strict=True):
+            labels[i] = _Label("heave-yaw" if _is_heave_yaw(found, i, states) else name, "body")
+    return labels
 
 
 # --- names of the body's modes ----------------------------------------------------------------------------------
 
 
-def _shares(mode: Mode, states: _States, wanted: Iterable[str]) -> dict[str, float]:
-    """Shares of states, 0 of those that there are not."""
+def _shares(row: Sequence[float], states: _States, wanted: Iterable[str]) -> dict[str, float]:
+    """Shares of states in a mode, 0 of those that there are not."""
     places = states.places
-    return {name: float(mode.participation[places[name]]) if name in places else 0.0 for name in wanted}
+    return {name: row[places[name]] if name in places else 0.0 for name in wanted}
 
 
-def _is_heave_yaw(mode: Mode, states: _States) -> bool:
+def _is_heave_yaw(found: _Found, number: int, states: _States) -> bool:
     """True for an oscillation of w and r against each other, which has none of the classical names."""
-    shares = _shares(mode, states, (*LONGITUDINAL, *LATERAL))
+    if not found.modes[number].is_oscillatory:
+        return False
+    shares = _shares(found.rows[number], states, (*LONGITUDINAL, *LATERAL))
     first, second = sorted(shares, key=lambda name: -shares[name])[:2]
-    return mode.is_oscillatory and {first, second} == {"w", "r"} and shares[second] >= NOTABLE * shares[first]
+    return {first, second} == {"w", "r"} and shares[second] >= NOTABLE * shares[first]
 
 
-def _longitudinal_names(inside: Sequence[Mode], states: _States) -> list[str]:
+def _longitudinal_names(found: _Found, inside: Sequence[int], states: _States) -> list[str]:
     """Phugoid of u and theta, short period of q, or of w and q if they oscillate, heave of w; or what diverges."""
-    return [_longitudinal_name(mode, _shares(mode, states, LONGITUDINAL)) for mode in inside]
+    return [_longitudinal_name(found.modes[i], _shares(found.rows[i], states, LONGITUDINAL)) for i in inside]
 
 
 def _longitudinal_name(mode: Mode, share: Mapping[str, float]) -> str:
@@ -430,21 +488,22 @@ def _longitudinal_name(mode: Mode, share: Mapping[str, float]) -> str:
     return "short period" if lead == "q" else "heave subsidence"
 
 
-def _lateral_names(inside: Sequence[Mode], states: _States) -> list[str]:
+def _lateral_names(found: _Found, inside: Sequence[int], states: _States) -> list[str]:
     """Dutch roll of v with phi or r, roll of p, spiral of r or phi; roll-spiral for a pair with little of v.
 
     Without a pair for the Dutch roll real poles with much of v are it, and what diverges of v and r is yaw; but of
     several real poles the one with least of v is the spiral.
     """
-    shares = [_shares(mode, states, LATERAL) for mode in inside]
+    modes_inside = [found.modes[i] for i in inside]
+    shares = [_shares(found.rows[i], states, LATERAL) for i in inside]
     names = [
         _lateral_pair(share) if mode.is_oscillatory else "roll" if share["p"] == max(share.values()) else ""
-        for mode, share in zip(inside, shares, strict=True)
+        for mode, share in zip(modes_inside, shares, strict=True)
     ]
     left = sorted((i for i, name in enumerate(names) if not name), key=lambda i: shares[i]["v"])
     slipping = [i for i in left if "Dutch roll" not in names and shares[i]["v"] >= NOTABLE * max(shares[i].values())]
     for i in left:
-        is_yaw = inside[i].is_growing and shares[i]["r"] > shares[i]["phi"]
+        is_yaw = modes_inside[i].is_growing and shares[i]["r"] > shares[i]["phi"]
         names[i] = ("yaw divergence" if is_yaw else "Dutch roll") if i in slipping else "spiral"
     if len(left) == len(slipping) > 1:
         names[left[0]] = "spiral"
@@ -461,21 +520,29 @@ def _lateral_pair(share: Mapping[str, float]) -> str:
 # --- names of the rotors' modes ---------------------------------------------------------------------------------
 
 
-def _name_rotors(inside: Sequence[Mode], group: _Group, speeds: Mapping[int, float], states: _States) -> list[Mode]:
+def _rotor_labels(
+    found: _Found, inside: Sequence[int], group: _Group, speeds: Mapping[int, float], states: _States
+) -> list[_Label]:
     """Names of the modes of a family: as many poles to a harmonic as it has states, with the largest participation.
 
     One for one, because some are close together: with nu near 1/2 collective and regressing lag are.
     """
     slots = [harmonic for harmonic, places in group.by_harmonic.items() for _ in places]
-    shares = {
-        harmonic: [float(mode.participation[places].sum()) for mode in inside]
-        for harmonic, places in group.by_harmonic.items()
-    }
+    shares = {harmonic: _of(found.sums(places), inside) for harmonic, places in group.by_harmonic.items()}
+    by_rotor = {rotor: _of(found.sums(places), inside) for rotor, places in group.by_rotor.items()}
+    own = [found.modes[i] for i in inside]
     largest = [max(shares, key=lambda harmonic: shares[harmonic][i]) for i in range(len(inside))]
     return [
-        _name_rotor(mode, group, taken[0] if taken else alone, speeds, states)
-        for mode, taken, alone in zip(inside, _match(inside, slots, shares), largest, strict=True)
+        _rotor_label(
+            *(mode, {rotor: having[i] for rotor, having in by_rotor.items()}, group),
+            *(taken[0] if taken else largest[i], speeds, states),
+        )
+        for i, (mode, taken) in enumerate(zip(own, _match(own, slots, shares), strict=True))
     ]
+
+
+def _of(values: Sequence[float], numbers: Sequence[int]) -> list[float]:
+    return [values[i] for i in numbers]
 
 
 def _match(found: Sequence[Mode], slots: Sequence[int], shares: Mapping[int, list[float]]) -> list[list[int]]:
@@ -490,10 +557,16 @@ def _match(found: Sequence[Mode], slots: Sequence[int], shares: Mapping[int, lis
     return [sorted(taken, key=lambda slot: -shares[slot][i]) for i, taken in enumerate(result)]
 
 
-def _name_rotor(mode: Mode, group: _Group, harmonic: int, speeds: Mapping[int, float], states: _States) -> Mode:
-    """Name of a mode of a harmonic, with the rotor that has it, or what several do together."""
+def _rotor_label(
+    mode: Mode,
+    shares: Mapping[int, float],
+    group: _Group,
+    harmonic: int,
+    speeds: Mapping[int, float],
+    states: _States,
+) -> _Label:
+    """Name of a mode of a harmonic, with the rotor that has it, or what several do together; by each rotor's share."""
     name = _family_name(group.family, harmonic)
-    shares = {rotor: float(mode.participation[places].sum()) for rotor, places in group.by_rotor.items()}
     owner = max(shares, key=lambda rotor: shares[rotor])
     if group.family != "inflow" and harmonic > 0:
         name = f"{_way(mode, harmonic * speeds[owner], group.by_both[owner, harmonic])} {name}".strip()
@@ -502,7 +575,7 @@ def _name_rotor(mode: Mode, group: _Group, harmonic: int, speeds: Mapping[int, f
     if len(having) == 2:
         first, second = (mode.vector[group.by_both[rotor, harmonic]] for rotor in having)
         name += ", symmetric" if np.vdot(first, second).real > 0.0 else ", antisymmetric"
-    return replace(mode, name=name, family=group.family, rotors=tuple(rotor + 1 for rotor in having))
+    return _Label(name, group.family, tuple(rotor + 1 for rotor in having))
 
 
 def _family_name(family: str, harmonic: int) -> str:

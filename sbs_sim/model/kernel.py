@@ -14,6 +14,7 @@ from typing import Any
 import numba
 from llvmlite.binding import executionengine
 from numba.core.registry import cpu_target
+from numba.extending import typeof_impl
 from numba.types import WrapperAddressProtocol
 
 from sbs_sim.interruption import raised_outside
@@ -79,15 +80,24 @@ class Address(WrapperAddressProtocol):
     def __init__(self, function: Any, *arguments: Any) -> None:
         types = tuple(numba.typeof(argument) for argument in arguments)
         function.compile(types)  # takes it from the cache; does nothing where it is there
-        self._code = function.overloads[types]
+        code = function.overloads[types]
+        self._code = code  # must not go while somebody knows where it is
+        self._place = int(code.library.get_pointer_to_function(code.fndesc.llvm_cfunc_wrapper_name))
+        self.type = numba.types.FunctionType(code.signature)
 
     def __wrapper_address__(self) -> int:
         """Where the code is; numba asks for it."""
-        return int(self._code.library.get_pointer_to_function(self._code.fndesc.llvm_cfunc_wrapper_name))
+        return self._place
 
     def signature(self) -> Any:
         """Types of arguments and result; numba asks for them."""
         return self._code.signature
+
+
+@typeof_impl.register(Address)
+def _type_of_address(address: Address, _: Any) -> Any:
+    """At every call; numba's own answer makes a new type each time."""
+    return address.type
 
 
 def address(function: Any, *arguments: Any) -> Any:

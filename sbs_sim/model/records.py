@@ -4,7 +4,9 @@ A record holds values of n aircraft side by side, see `sbs_sim.lanes.memory`. Wh
 n where the lanes are flights, more where a single flight has its blades for lanes.
 """
 
+import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 LANES, VECTOR, MATRIX, WHOLE = (), (3,), (3, 3), None
+LINE = 64  # bytes of a cache line
 QUAD = 4  # blades that are summed up first, see `sbs_sim.lanes.memory`
 
 AIR = {"density": LANES, "inverse_viscosity": LANES, "gravity": LANES, "plate_areas": VECTOR}
@@ -128,18 +131,21 @@ LOAD_SIZE = 8
 
 def dtype_of(fields: dict[str, Any], n: int) -> np.dtype[Any]:
     """Structured type of records of n lanes."""
-    return np.dtype(
-        [(name, np.int64) if kind is WHOLE else (name, np.float64, (*kind, n)) for name, kind in fields.items()]
-    )
+    return _dtype_of(tuple(fields.items()), n)
+
+
+@cache
+def _dtype_of(fields: tuple[tuple[str, Any], ...], n: int) -> np.dtype[Any]:
+    return np.dtype([(name, np.int64) if kind is WHOLE else (name, np.float64, (*kind, n)) for name, kind in fields])
 
 
 def aligned(shape: Any, dtype: Any) -> NDArray[Any]:
     """Zeros that begin where a cache line does."""
-    dtype = np.dtype(dtype)
-    size = int(np.prod(shape)) * dtype.itemsize
-    raw = np.zeros(size + 64, dtype=np.uint8)
-    start = -raw.ctypes.data % 64
-    return raw[start : start + size].view(dtype).reshape(shape)
+    dtype, whole = np.dtype(dtype), shape if isinstance(shape, tuple) else (shape,)
+    size = math.prod(whole) * dtype.itemsize
+    raw = np.zeros(size + LINE, dtype=np.uint8)
+    place: int = raw.__array_interface__["data"][0]
+    return np.ndarray(whole, dtype, raw, -place % LINE)
 
 
 def records(fields: dict[str, Any], shape: Any, n: int) -> NDArray[Any]:

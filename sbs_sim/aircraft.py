@@ -432,6 +432,11 @@ class Aircraft(ByContent):
         return {}
 
     @cached_property
+    def hovers(self) -> dict[Any, Any]:
+        """What the search for trims has found of hovering, from which it looks for all other flights."""
+        return {}
+
+    @cached_property
     def _model(self) -> Model:
         return model_of(self)
 

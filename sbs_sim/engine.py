@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -105,4 +106,13 @@ class Engine:
         return made
 
 
+def points_engine(model: R.Model) -> Engine:
+    """The calling thread's engine of a model that is arranged by "points"; what is in it lasts until the next call."""
+    kept: Engine | None = getattr(_own, "engine", None)
+    if kept is None or kept.model is not model:
+        kept = _own.engine = Engine(model)
+    return kept
+
+
+_own = threading.local()
 _codes: dict[tuple[int, int], Code] = {}

@@ -23,7 +23,7 @@ from sbs_sim.analysis.control_effects import ControlEffect, control_effects
 from sbs_sim.analysis.modes import Mode, modes
 from sbs_sim.analysis.trim import Guess, TrimPoint, trim
 from sbs_sim.content import ByContent
-from sbs_sim.engine import Engine
+from sbs_sim.engine import points_engine
 from sbs_sim.errors import LinearizationError
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
@@ -397,7 +397,7 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
     ndarray, shape (n_azimuths, linear_size + 3 + 8 n_rotors, linear_size + 4)
         Columns of states that the fidelity leaves out are zero.
     """
-    engine = Engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
+    engine = points_engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
     inputs = np.concatenate([point.state, point.controls])
     outputs = len(point.state) + SPECIFIC_FORCE_SIZE + R.LOAD_SIZE * engine.rotors
     used = np.zeros(len(inputs), dtype=bool)

@@ -17,7 +17,7 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.export import trim_to_dict
 from sbs_sim.content import ByContent
-from sbs_sim.engine import Engine
+from sbs_sim.engine import Engine, points_engine
 from sbs_sim.errors import TrimError
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
@@ -248,7 +248,7 @@ class TrimProblem:
         self.aircraft = aircraft
         self.lead_lag, self.cyclic_inflow, self.azimuth_count = lead_lag, cyclic_inflow, azimuth_count
         self.layout = aircraft.layout
-        self.engine = Engine(aircraft.arranged(lead_lag, cyclic_inflow, "points"))
+        self.engine = points_engine(aircraft.arranged(lead_lag, cyclic_inflow, "points"))
         self._psi = azimuths(self.layout.blades, azimuth_count)
         self._places, equations = self._rotor_unknowns()
         self.equations = np.concatenate([np.arange(S.VELOCITY, S.BODY_SIZE), equations])

@@ -42,6 +42,15 @@ class _End(NamedTuple):
     error: TrimError
 
 
+class _Hover(NamedTuple):
+    """Unknowns of a hover or None, mean loads of the last residual, Newton iterations, and what has failed."""
+
+    unknowns: Array | None
+    loads: Array
+    iterations: int
+    error: TrimError | None
+
+
 def find(problem: TrimProblem, condition: TrimCondition, guess: Array | None = None) -> tuple[Array, int]:
     """Find a trim: from a guess, from hover, by momentum theory, from a lighter aircraft, from other speeds.
 
@@ -73,10 +82,10 @@ def find(problem: TrimProblem, condition: TrimCondition, guess: Array | None = N
 class _Search:
     """The search for one trim: what was tried, and where it has ended."""
 
-    def __init__(self, problem: TrimProblem, condition: TrimCondition) -> None:
+    def __init__(self, problem: TrimProblem, condition: TrimCondition, theory: MomentumTheory | None = None) -> None:
         self.iterations = 0
         self._problem, self._condition = problem, condition
-        self._theory = MomentumTheory(problem)
+        self._theory = theory or MomentumTheory(problem)
         self._is_hover = not condition.is_motion
         self._hover: Array | None = None
         self._error: TrimError | None = None
@@ -130,11 +139,22 @@ class _Search:
 
     def _from_hover(self) -> Array | None:
         """Hover by momentum theory, and from it the flight at once."""
-        hover = self._condition.scaled(0.0)
-        self._hover = self._newton(self._problem, hover, self._theory.guess(hover))
+        known, problem, hover = self._problem.aircraft.hovers, self._problem, self._condition.scaled(0.0)
+        # by its text, in which zeros have signs: no bit depends on what was looked for before
+        key = problem.lead_lag, problem.cyclic_inflow, problem.azimuth_count, repr(hover)
+        if key not in known:
+            known[key] = self._hovering(hover)
+        self._hover, problem.loads, iterations, error = known[key]
+        self.iterations += iterations
+        self._error = self._error or error
         if self._hover is None or self._is_hover:
             return self._hover
-        return self._newton(self._problem, self._condition, self._hover)
+        return self._newton(problem, self._condition, self._hover)
+
+    def _hovering(self, hover: TrimCondition) -> _Hover:
+        search = _Search(self._problem, hover, self._theory)
+        found = search._newton(self._problem, hover, self._theory.guess(hover))
+        return _Hover(found, self._problem.loads, search.iterations, search._error)
 
     def _along_path(self) -> Array | None:
         """Flights between hover and the one wanted: that stays on the branch of hover."""

@@ -45,6 +45,21 @@ def outputs(model, point, psi):
     return np.concatenate([rates, force, model.loads.ravel()])
 
 
+def jacobians(model, point, steps, psi):
+    """Transposed Jacobians; NaN where nothing is written."""
+    engine, layout = model.points, model.layout
+    rotors = [S.part_of(name).rotor for name in layout.linear_names] + [-1] * len(S.CONTROL_NAMES)
+    owners = np.array([2 if rotor < 0 else rotor for rotor in rotors])
+    size = layout.linear_size + SPECIFIC_FORCE_SIZE + 2 * R.LOAD_SIZE
+    found = np.full((len(psi), len(point), size), np.nan)
+    jacobian(
+        *(engine.code.derivative, engine.model, point, model.aircraft.mixing, steps, owners, psi),
+        *(engine.work, engine.tick, engine.memory(len(point)), np.empty((2, size))),
+        *(np.empty(engine.n, dtype=np.int64), found),
+    )
+    return found
+
+
 def test_jacobian_is_the_difference_of_the_outputs(model, point):
     """Column by column, those of body, rotors and controls; a column without a step is left alone."""
     psi, step = np.array([[0.7, 3.9]]), 1e-5
@@ -52,16 +67,8 @@ def test_jacobian_is_the_difference_of_the_outputs(model, point):
     chosen = [names.index(name) for name in (*COLUMNS, S.CONTROL_NAMES[3])]
     steps = np.zeros(len(point))
     steps[chosen] = step
-    mixing = np.concatenate([rotor.mixing for rotor in model.aircraft.rotors])
-    size = model.layout.linear_size + SPECIFIC_FORCE_SIZE + 2 * R.LOAD_SIZE
-    found = np.full((1, len(point), size), np.nan)
     given = point.copy()
-    engine = model.points
-    memory = engine.memory(len(point)), np.empty((engine.n + 1, size))
-    jacobian(
-        *(engine.code.derivative, engine.model, given, mixing, steps, psi, engine.work, engine.tick),
-        *(*memory, found),
-    )
+    found = jacobians(model, given, steps, psi)
     np.testing.assert_array_equal(given, point)
     for i in chosen:
         moved = step * np.eye(len(point))[i]
@@ -69,6 +76,17 @@ def test_jacobian_is_the_difference_of_the_outputs(model, point):
         scale = np.abs(expected).max()
         np.testing.assert_allclose(found[0, i], expected, rtol=1e-6, atol=1e-9 * scale, err_msg=names[i])
     assert np.isnan(np.delete(found[0], chosen, axis=0)).all()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 8, 12])
+def test_jacobians_are_the_same_for_any_number_of_azimuths(model, point, count):
+    """To the last bit: a lane tells nothing of its neighbours, and a blade nothing of what was worked out before."""
+    steps, psi = np.full(len(point), 1e-4), azimuths((3, 4), count)
+    alone = [
+        [jacobians(model, point, own, psi[k : k + 1])[0, i] for i, own in enumerate(np.diag(steps))]
+        for k in range(count)
+    ]
+    np.testing.assert_array_equal(jacobians(model, point, steps, psi), alone)
 
 
 def test_average_is_the_mean_over_the_azimuths(model, point):

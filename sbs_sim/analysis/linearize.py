@@ -410,13 +410,21 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
             inputs,
             aircraft.mixing,
             np.where(used, steps, 0.0),
+            _owners(aircraft),
             psi,
             engine.work,
             engine.tick,
         ),
-        *(engine.memory(len(inputs)), np.zeros((engine.n + 1, outputs)), result),
+        *(engine.memory(len(inputs)), np.zeros((2, outputs)), np.zeros(engine.n, dtype=np.int64), result),
     )
     return result.transpose(0, 2, 1)
+
+
+def _owners(aircraft: Aircraft) -> NDArray[np.int64]:
+    """Numbers of the rotors that linear states belong to; that of all rotors for those of the body and controls."""
+    count = len(aircraft.rotors)
+    rotors = [S.part_of(name).rotor for name in aircraft.layout.linear_names]
+    return np.array([count if rotor < 0 else rotor for rotor in rotors] + [count] * len(S.CONTROL_NAMES))
 
 
 def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> LinearModel:

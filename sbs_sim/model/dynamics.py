@@ -80,6 +80,7 @@ class Memory(NamedTuple):
     flow: Any
     strip: Any
     loads: Any
+    span: Any
 
 
 class Flight(NamedTuple):
@@ -166,6 +167,7 @@ def memory_in_lanes(work):
         as_records(work.flow),
         as_records(work.strip),
         as_records(work.loads),
+        work.span,
     )
 
 
@@ -212,7 +214,7 @@ def hub_motion(part, flight):
 def blade_terms(aircraft, memory, flight, swash, psi):
     """What is kept of every blade, and the sums over quads."""
     switches, air = aircraft.switches[0], aircraft.air[0]
-    for r in range(aircraft.blades.shape[0]):
+    for r in range(memory.span[0], memory.span[1]):
         blade, terms = aircraft.blades[r], memory.terms[r]
         pose = blade_pose(aircraft, memory.state, blade, psi)
         basis = blade_basis(blade, pose)

@@ -10,64 +10,84 @@ SPECIFIC_FORCE_SIZE = 3
 
 
 @entry
-def jacobian(derivative, model, point, mixing, steps, psi, work, tick, inputs, values, out):
+def jacobian(derivative, model, point, mixing, steps, owners, psi, work, tick, inputs, values, columns, out):
     """Central differences about one point at given azimuths, as many evaluations at once as there are lanes.
+
+    Two lanes are the two sides of a column at an azimuth. What belongs to a rotor changes nothing about the blades of
+    the others, whose terms are kept from one column to the next.
 
     Parameters
     ----------
-    derivative, model, work, tick : see `sbs_sim.model.integrate.advance`
+    derivative, model, work, tick : see `sbs_sim.model.integrate.advance`; the lanes are states of one aircraft
     point : ndarray, shape (m,)
         Linear state and pilot controls.
     mixing : ndarray, shape (3 n_rotors, n_controls)
         Swashplate angles = mixing @ controls.
     steps : ndarray, shape (m,)
         Half the distance of each pair of evaluations; 0 leaves a column alone.
+    owners : ndarray of int64, shape (m,)
+        Number of the rotor that an input belongs to; n_rotors for those of the body and for controls.
     psi : ndarray, shape (n_azimuths, n_rotors)
         Azimuth of the first blade of each rotor [rad].
     inputs : ndarray, shape (m, n)
         Memory.
-    values : ndarray, shape (lanes + 1, k)
-        Memory, for the outputs of a round and for those that wait for the other one of a pair.
+    values : ndarray, shape (2, k)
+        Memory, for the outputs of a pair.
+    columns : ndarray of int64, shape (n,)
+        Memory.
     out : ndarray, shape (n_azimuths, m, k), k = n_linear + 3 + 8 n_rotors
         Output: the transposed Jacobian at each azimuth; columns without a step stay as they are.
     """
-    lanes, m = inputs.shape[1], point.size
-    columns = 0
-    for i in range(m):
-        columns += steps[i] != 0.0
-    count = 2 * columns * psi.shape[0]
-    for first in range(0, count, lanes):
-        for lane in range(lanes):
-            number = min(first + lane, count - 1)
-            k, column = number // (2 * columns), column_of(steps, number // 2 % columns)
-            for i in range(m):
-                inputs[i, lane] = point[i]
-            inputs[column, lane] = point[column] + (1.0 - 2.0 * (number % 2)) * steps[column]
-            for j in range(psi.shape[1]):
-                tick.psi[j, lane] = psi[k, j]
-        evaluate_inputs(derivative, model, inputs, mixing, work, tick)
-        for lane in range(min(lanes, count - first)):
-            number = first + lane
-            row = values[lane]
-            gather_outputs(tick, work, lane, row)
-            k, column = number // (2 * columns), column_of(steps, number // 2 % columns)
-            if number % 2 == 0:
-                for i in range(row.size):
-                    values[lanes, i] = row[i]
-            else:
-                for i in range(row.size):
-                    out[k, column, i] = (values[lanes, i] - row[i]) / (2.0 * steps[column])
+    half, rotors = inputs.shape[1] // 2, psi.shape[1]
+    for first in range(0, psi.shape[0], half):
+        azimuths = min(half, psi.shape[0] - first)
+        begin = 0
+        for owner in range(rotors + 1):
+            blades = model.rotors[owner]["blades"] if owner < rotors else 0
+            column, whole = next_column(steps, owners, owner, 0), True
+            while column < point.size:
+                count = 0
+                while count < half // azimuths and column < point.size:
+                    columns[count] = column
+                    count += 1
+                    column = next_column(steps, owners, owner, column + 1)
+                set_pairs(point, steps, psi, first, azimuths, columns, count, inputs, tick.psi)
+                if owner < rotors and not whole:
+                    work.span[0], work.span[1] = begin, begin + blades
+                evaluate_inputs(derivative, model, inputs, mixing, work, tick)
+                whole = False
+                for pair in range(count * azimuths):
+                    k, changed = first + pair % azimuths, columns[pair // azimuths]
+                    gather_outputs(tick, work, 2 * pair, values[0])
+                    gather_outputs(tick, work, 2 * pair + 1, values[1])
+                    for i in range(values.shape[1]):
+                        out[k, changed, i] = (values[0, i] - values[1, i]) / (2.0 * steps[changed])
+            work.span[0], work.span[1] = 0, model.blades.size
+            begin += blades
 
 
 @kernel
-def column_of(steps, number):
-    """Place of a step that is not zero, by its number among them."""
-    for i in range(steps.size):
-        if steps[i] != 0.0:
-            if number == 0:
-                return i
-            number -= 1
-    return 0
+def next_column(steps, owners, owner, column):
+    """The first input from `column` on that has an owner and a step; their number where there is none."""
+    while column < steps.size and (steps[column] == 0.0 or owners[column] != owner):
+        column += 1
+    return column
+
+
+@kernel
+def set_pairs(point, steps, psi, first, azimuths, columns, count, inputs, places):
+    """Inputs of lanes by twos: one column after the other, each at all azimuths from `first` on; the last fill up.
+
+    The azimuth of a lane does not depend on the columns.
+    """
+    for lane in range(inputs.shape[1]):
+        pair = lane // 2
+        column = columns[min(pair // azimuths, count - 1)]
+        for i in range(point.size):
+            inputs[i, lane] = point[i]
+        inputs[column, lane] = point[column] + (1.0 - 2.0 * (lane % 2)) * steps[column]
+        for j in range(psi.shape[1]):
+            places[j, lane] = psi[first + pair % azimuths, j]
 
 
 @kernel

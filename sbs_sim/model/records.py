@@ -230,6 +230,9 @@ class Work(NamedTuple):
         Loads of the rotors, where they were asked for.
     load_rows : ndarray, shape (8 n_rotors, n)
         The same numbers.
+    span : ndarray of int64, shape (2,)
+        First register of blades whose terms are worked out, and the one behind the last; those of the others stay what
+        they were. All of them, unless somebody sets it for a while.
     """
 
     state: Array
@@ -244,6 +247,7 @@ class Work(NamedTuple):
     strip: NDArray[Any]
     loads: NDArray[Any]
     load_rows: Array
+    span: IntArray
 
 
 def state_size(model: Model) -> int:
@@ -271,6 +275,7 @@ def make_work(model: Model) -> Work:
         strip=records(STRIP, model.elements.shape[1], width),
         loads=load_rows.reshape(-1).view(dtype_of(LOADS, n)),
         load_rows=load_rows,
+        span=np.array([0, len(model.blades)]),
     )
 
 

@@ -115,12 +115,18 @@ class Formation:
         list of Flown
             Of each flight. Flights that ended in a call before have no rows.
         """
-        engine, first, count = self._engine, self.simulations[0], len(swashplates[0])
+        engine, count, flew = self._engine, len(swashplates[0]), (self._culprit == FLYING).tolist()
         code = engine.code
-        plans = [_plan(one, count, ticks, every, loaded) for one in self.simulations]
-        told, watched = plans[0].told, plans[0].watched
+        # one that still flies: those that have ended stay where and when that was
+        lead = flew.index(True) if any(flew[: len(self.simulations)]) else 0
+        first = self.simulations[lead]
+        plan = _plan(first, count, ticks, every, loaded)
+        plans = [
+            _plan(one, count, ticks, every, loaded) if flew[lane] and lane != lead else plan
+            for lane, one in enumerate(self.simulations)
+        ]
+        told, watched = plan.told, plan.watched
         x, step = engine.lanes([one.state for one in self.simulations]), np.full(engine.n, first.step)
-        flew = self._culprit == FLYING
         states, forces = engine.memory(len(told), engine.size), engine.memory(len(told), 3)
         loads = engine.memory(len(told), LOAD_SIZE * engine.rotors)
         working = engine.memory(len(watched), engine.rotors, WORKING_SIZE)

@@ -103,6 +103,23 @@ def test_a_flight_longer_than_a_block_is_the_single_one(sbs, hover):
     assert_same(batch, 0, flight, 300)
 
 
+@pytest.mark.parametrize("failing", [(0,), (3, 7)])
+def test_a_flight_that_ended_in_an_earlier_block_disturbs_no_other(sbs, hover, failing):
+    """Wherever it flew beside them: the first tells the others no time, and none how many rows there are."""
+    sinking = hover.controls - [0.08, 0.0, 0.0, 0.0]
+    cases = [Case(sbs, hover, sinking if i in failing else None, gusts(i)) for i in range(8)]
+    options = {"every": 7, "ground_altitude": -2.0}
+    batch = simulate_batch(cases, 1.7, workers=1, **options)
+    assert batch.failed == failing
+    for i in failing:
+        assert "ground contact" in batch.errors[i]
+        assert 1 < np.isfinite(batch["u"][i]).sum() < len(batch.time) // 1.4  # before the end of the first block
+    for i in set(range(8)) - set(failing):
+        flight = simulate(sbs, hover, hover.controls, 1.7, wind=gusts(i), ground_altitude=-2.0)
+        np.testing.assert_array_equal(batch["state"][i], flight["state"][::7])
+        np.testing.assert_array_equal(batch["thrust"][i], flight["thrust"][::7])
+
+
 def test_changes_and_trims_are_made_for_each_flight(sbs):
     case = Case(sbs, {"airspeed": 9.0}, wind=gusts(7), changes={"body.mass": 22.0, "rotors.blade_mass": 0.17})
     batch = simulate_batch([case], DURATION, lead_lag=False)

@@ -30,6 +30,7 @@ LARGEST_OUTSIDE = 0.1  # of the disc, with Reynolds numbers that the airfoil's t
 RING_DESCENT = (0.45, 1.5)
 RING_EDGEWISE = 0.95
 WINDMILL_DESCENT = 2.0
+MARGIN = 1e-9  # for rounding
 LEAST_INFLOW = 0.002  # hover inflow ratio below which a rotor carries nothing, and has none of these states
 
 NORMAL, UNLOADED, VORTEX_RING, TURBULENT_WAKE, WINDMILL = INFLOW_STATES = (
@@ -169,4 +170,21 @@ def flight_warnings(aircraft: Aircraft, working: Array) -> Iterator[str]:
     aircraft : Aircraft
     working : ndarray, shape (n, n_rotors, WORKING_SIZE)
     """
-    return iter(dict.fromkeys(line for rows in working for line in warnings(aircraft, rows)))
+    told = working[~_is_quiet(aircraft, working)] if len(working) else working
+    return iter(dict.fromkeys(line for rows in told for line in warnings(aircraft, rows)))
+
+
+def _is_quiet(aircraft: Aircraft, working: Array) -> NDArray[np.bool_]:
+    """Instants of which `warnings` surely says nothing, shape (n,); most are, and words take long."""
+    sound = aircraft.environment.speed_of_sound
+    tips = np.array([rotor.speed * rotor.radius for rotor in aircraft.rotors])
+    quiet = (
+        (working[..., W.ADVANCE_RATIO] <= LARGEST_ADVANCE_RATIO)
+        & (working[..., W.STALLED] <= LARGEST_STALLED)
+        & (working[..., W.REVERSED] <= LARGEST_REVERSED)
+        & (working[..., W.OUTSIDE] <= LARGEST_OUTSIDE)
+        & (tips * (1.0 + working[..., W.ADVANCE_RATIO]) / sound <= LARGEST_TIP_MACH)
+        # no vortex ring before its slowest descent, and nothing beyond it
+        & (working[..., W.DESCENT] < RING_DESCENT[0] * (1.0 - MARGIN) * working[..., W.HOVER_INFLOW])
+    )
+    return np.asarray(quiet.all(axis=1))

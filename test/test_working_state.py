@@ -1,11 +1,15 @@
 """What is told of a flight besides its state, against its definition: working states of rotors, the lowest point."""
 
+import math
+
 import numpy as np
 import plain_model
 import pytest
 from helpers import Model, build, unit
 
+from sbs_sim import validity
 from sbs_sim.model import state as S
+from sbs_sim.model import working_state as W
 from sbs_sim.model.frames import euler_to_quaternion, hub_axes, rotation_matrix
 from sbs_sim.model.ground import lowest_point
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
@@ -130,3 +134,22 @@ def test_the_lowest_point_is_the_centre_of_gravity_under_high_rotors():
     x = model.state()
     x[2] = -7.0
     assert deepest(model, x) == -7.0
+
+
+def test_the_lines_of_a_flight_are_those_of_its_instants(sbs):
+    """Also of instants at the limits and beyond, and of what is no number."""
+    rng, shape = np.random.default_rng(1), (3000, len(sbs.rotors))
+    rows = np.zeros((*shape, W.WORKING_SIZE))
+    rows[..., W.ADVANCE_RATIO] = rng.choice([0.0, 0.1, 0.4, 0.41], shape)
+    rows[..., W.HOVER_INFLOW] = rng.choice([0.001, 0.05, 0.1], shape)
+    rows[..., W.DESCENT] = rng.choice([-1.0, 0.44, 0.45, 0.46, 1.6], shape) * rows[..., W.HOVER_INFLOW]
+    rows[..., W.FLOW] = rng.choice([-1.0, 1.0], shape)
+    for column in (W.STALLED, W.REVERSED, W.OUTSIDE):
+        rows[..., column] = rng.choice([0.0, 0.1, 0.11, math.nan], shape, p=[0.7, 0.2, 0.05, 0.05])
+    quiet = 0
+    for row in rows:
+        expected = validity.warnings(sbs, row)
+        quiet += not expected
+        assert list(validity.flight_warnings(sbs, row[np.newaxis])) == expected
+    assert 100 < quiet < 2900
+    assert list(validity.flight_warnings(sbs, rows[:0])) == []

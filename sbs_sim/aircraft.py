@@ -432,8 +432,8 @@ class Aircraft(ByContent):
         return {}
 
     @cached_property
-    def hovers(self) -> dict[Any, Any]:
-        """What the search for trims has found of hovering, from which it looks for all other flights."""
+    def kept(self) -> dict[Any, Any]:
+        """What searches for trims keep: rotors by momentum theory, and hovers, from which all other flights begin."""
         return {}
 
     @cached_property

@@ -5,6 +5,7 @@ at once. Of the thrusts, their tilt, the torques and the moments at the hubs the
 rotor's mixing, that carry the weight and leave no moment about the centre of gravity.
 """
 
+import copy
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -253,8 +254,10 @@ class MomentumTheory:
 
     def __init__(self, problem: TrimProblem) -> None:
         self._problem, self.aircraft = problem, problem.aircraft
-        model = problem.engine.model
-        self.rotors = [MomentumRotor(self.aircraft, model, j) for j in range(len(self.aircraft.rotors))]
+        kept, model = self.aircraft.kept, problem.engine.model
+        if MomentumRotor not in kept:
+            kept[MomentumRotor] = [MomentumRotor(self.aircraft, model, j) for j in range(len(self.aircraft.rotors))]
+        self.rotors: list[MomentumRotor] = [copy.copy(rotor) for rotor in kept[MomentumRotor]]  # they meet other air
 
     def guess(self, condition: TrimCondition, share: float = 1.0, controls: Array | None = None) -> Array:
         """Unknowns of a trim, shape (n,); the parameters are those of `balance`."""

@@ -22,7 +22,7 @@ from sbs_sim.errors import TrimError
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
-from sbs_sim.model.balance import trim_residuals
+from sbs_sim.model.balance import trim_residuals, trim_sides
 from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
@@ -250,7 +250,8 @@ class TrimProblem:
         self.layout = aircraft.layout
         self.engine = points_engine(aircraft.arranged(lead_lag, cyclic_inflow, "points"))
         self._psi = azimuths(self.layout.blades, azimuth_count)
-        self._places, equations = self._rotor_unknowns()
+        self._places, equations, owners = self._rotor_unknowns()
+        self._owners = np.concatenate([np.full(BODY_UNKNOWNS, len(aircraft.rotors)), owners])
         self.equations = np.concatenate([np.arange(S.VELOCITY, S.BODY_SIZE), equations])
         self.scales = self._equation_scales()
         is_inflow = self._places >= self.layout.inflow(0).start
@@ -258,10 +259,11 @@ class TrimProblem:
         self.inflow = BODY_UNKNOWNS + np.flatnonzero(is_inflow)
         self.loads = np.zeros((len(aircraft.rotors), R.LOAD_SIZE))
 
-    def _rotor_unknowns(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Places of the unknown rotor states in the simulation state, and of their equations in its rate."""
+    def _rotor_unknowns(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """Places of the unknown rotor states in the simulation state, of their equations in its rate; their rotors."""
         places: list[int] = []
         equations: list[int] = []
+        owners: list[int] = []
         index = np.arange(self.layout.size)
         for j in range(len(self.aircraft.rotors)):
             places += list(index[self.layout.flap(j)])
@@ -272,7 +274,8 @@ class TrimProblem:
             inflow = index[self.layout.inflow(j)][: 3 if self.cyclic_inflow else 1]
             places += list(inflow)
             equations += list(inflow)
-        return np.array(places), np.array(equations)
+            owners += [j] * (len(places) - len(owners))
+        return np.array(places), np.array(equations), np.array(owners)
 
     def _equation_scales(self) -> Array:
         gravity = max(self.aircraft.environment.gravity, 1.0)
@@ -318,8 +321,12 @@ class TrimProblem:
         steps = np.full(len(unknowns), ROTOR_STEP)
         steps[:ATTITUDE_UNKNOWNS] = BODY_STEP
         psi = azimuths(self.layout.blades, min(self.azimuth_count, JACOBIAN_AZIMUTHS))
-        sides = np.concatenate([unknowns + np.diag(steps), unknowns - np.diag(steps)])
-        forward, backward = np.split(self._residuals(condition, sides, psi)[0], 2)
+        engine, (forward, backward) = self.engine, (sides := np.empty((2, len(unknowns), len(self.equations))))
+        trim_sides(
+            *(engine.code.derivative, engine.model, unknowns, steps, self._owners, condition.along_heading()),
+            *(self._places, self.equations, self.scales, self.aircraft.mixing, psi, engine.work, engine.tick),
+            *(engine.memory(len(unknowns)), np.empty(engine.n, dtype=np.int64), sides),
+        )
         return ((forward - backward) / (2.0 * steps[:, np.newaxis])).T
 
     def _residuals(self, condition: TrimCondition, unknowns: Array, psi: Array) -> tuple[Array, Array]:

@@ -139,7 +139,7 @@ class _Search:
 
     def _from_hover(self) -> Array | None:
         """Hover by momentum theory, and from it the flight at once."""
-        known, problem, hover = self._problem.aircraft.hovers, self._problem, self._condition.scaled(0.0)
+        known, problem, hover = self._problem.aircraft.kept, self._problem, self._condition.scaled(0.0)
         # by its text, in which zeros have signs: no bit depends on what was looked for before
         key = problem.lead_lag, problem.cyclic_inflow, problem.azimuth_count, repr(hover)
         if key not in known:

@@ -4,6 +4,7 @@ from sbs_sim.lanes import Vector, as_lanes, as_records, rounded, transposed
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import rotation
 from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.linear import next_column, set_pairs
 from sbs_sim.model.mixing import mix
 from sbs_sim.model.trigonometry import cosine_sine
 
@@ -61,6 +62,61 @@ def trim_residuals(derivative, model, unknowns, motion, places, equations, scale
                 residuals[i, e] += share * (tick.slopes[0, equations[e], lane] / scales[e])
             for k in range(loads.shape[1]):
                 loads[i, k] += share * work.load_rows[k, lane]
+
+
+@entry
+def trim_sides(derivative, model, unknowns, steps, owners, motion, places, equations, scales, mixing, psi, work, tick,
+               inputs, columns, residuals):  # fmt: skip
+    """Scaled residuals on both sides of every unknown, averaged over the azimuth, as `trim_residuals` has them.
+
+    Parameters
+    ----------
+    derivative, model, motion, places, equations, scales, mixing, psi, work, tick, inputs : see `trim_residuals`
+    unknowns, steps : ndarray, shape (n_unknowns,)
+        One set of unknowns, and how far the sides are from it.
+    owners, columns : see `sbs_sim.model.linear.jacobian`
+    residuals : ndarray, shape (2, n_unknowns, n_equations)
+        Output: with the step added, and with it subtracted.
+    """
+    half, rotors, share = inputs.shape[1] // 2, psi.shape[1], 1.0 / psi.shape[0]
+    for side in range(2):
+        for i in range(unknowns.size):
+            for e in range(equations.size):
+                residuals[side, i, e] = 0.0
+    for first in range(0, psi.shape[0], half):
+        azimuths = min(half, psi.shape[0] - first)
+        begin = 0
+        for owner in range(rotors + 1):
+            blades = model.rotors[owner]["blades"] if owner < rotors else 0
+            column, whole = next_column(steps, owners, owner, 0), True
+            while column < unknowns.size:
+                count = 0
+                while count < half // azimuths and column < unknowns.size:
+                    columns[count] = column
+                    count += 1
+                    column = next_column(steps, owners, owner, column + 1)
+                set_pairs(unknowns, steps, psi, first, azimuths, columns, count, inputs, tick.psi)
+                set_flight(model, inputs, motion, places, mixing, tick)
+                if owner < rotors and not whole:
+                    work.span[0], work.span[1] = begin, begin + blades
+                derivative(
+                    model,
+                    tick.stage,
+                    tick.slopes[1, : mixing.shape[0]],
+                    tick.psi,
+                    tick.wind,
+                    work,
+                    tick.slopes[0],
+                    False,
+                )
+                whole = False
+                for lane in range(2 * count * azimuths):
+                    changed = columns[lane // 2 // azimuths]
+                    for e in range(equations.size):
+                        rate = tick.slopes[0, equations[e], lane]
+                        residuals[lane % 2, changed, e] += share * (rate / scales[e])
+            work.span[0], work.span[1] = 0, model.blades.size
+            begin += blades
 
 
 @kernel

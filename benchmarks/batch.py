@@ -6,11 +6,13 @@ show what perfect scaling is while other programs are at work, and the threads a
 
 import argparse
 import os
+import resource
 import statistics
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from pathlib import Path
 
 from sbs_sim import Aircraft, Case, simulate_batch, trim
 from sbs_sim.model.wind import Wind
@@ -28,6 +30,17 @@ def fly(first: int, count: int, duration: float, threads: int) -> int:
     ]
     batch = simulate_batch(cases, duration, every=10, outputs=["state"], workers=threads)
     return len(batch.cases)
+
+
+def memory(flights: int, duration: float) -> tuple[float, float]:
+    """Peak memory that flights take in this process, with all outputs of every tick, and that of the histories [MB]."""
+    aircraft = Aircraft.load("sbs")
+    point = trim(aircraft)
+    simulate_batch([Case(aircraft, point)] * 16, 0.1)
+    before = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    batch = simulate_batch([Case(aircraft, point)] * flights, duration)
+    peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    return peak / 1e6, sum(values.nbytes for values in batch.histories.values()) / 1e6
 
 
 def main() -> None:
@@ -58,6 +71,8 @@ def batch_rows(flights: int, duration: float, rounds: int, many: int) -> list[Ro
             f"{many} processes": processes,
         }
         rates = measured(ways, rounds)
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        peak, held = pool.submit(memory, 200, 10.0).result()
     rows: list[Row] = []
     for name, found in rates.items():
         rate = statistics.median(found)
@@ -67,6 +82,7 @@ def batch_rows(flights: int, duration: float, rounds: int, many: int) -> list[Ro
         shares = [100 * rate / best for rate, best in zip(threads, perfect, strict=True)]
         note = f"median of {rounds} rounds, best {max(shares):.0f} %"
         rows.append((f"  {many} threads, of {name}", statistics.median(shares), "%", note))
+    rows.append(("batch of 200 flights of 10 s, memory", peak, "MB", f"at its peak; {held:.0f} MB are the histories"))
     return rows
 
 

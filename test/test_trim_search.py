@@ -367,6 +367,23 @@ def test_level_flight_is_looked_for_where_there_is_nothing_slower(sbs):
     assert len(_Search(problem, TrimCondition(-3.0))._other_speeds()) == 3
 
 
+def test_what_was_trimmed_before_changes_no_bit():
+    """An aircraft keeps its hovers: those of other fidelity, and those with zeros of other signs, are others."""
+    used = build()
+    flights = [{}, {"airspeed": 9.0}, {"airspeed": -3.0}, {"airspeed": 5.0, "cyclic_inflow": False}]
+    for flight in (*flights, {"airspeed": 3.0, "sideslip": 0.2}, {"climb_rate": 1.0, "azimuth_count": 5}, *flights):
+        assert trim(used, **flight) == trim(build(), **flight)
+
+
+def test_a_hover_that_failed_fails_again_with_the_same_words():
+    aircraft, told = build(body={"mass": 90.0}), []
+    for _ in range(2):
+        with pytest.raises(TrimError, match="cannot carry more than") as caught:
+            trim(aircraft)
+        told.append((str(caught.value), caught.value.residual))
+    assert told[0] == told[1]
+
+
 def test_of_two_flights_the_one_within_the_limits_is_found(sbs_paper):
     """At 20 m/s in a turn there is one with 13.4 deg of longitudinal cyclic, and one with 11.9 of 12."""
     point = trim(sbs_paper, 20.0, turn_rate=0.2)

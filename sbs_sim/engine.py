@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +22,46 @@ from sbs_sim.model.working_state import WORKING_SIZE, working_state
 Array = NDArray[np.float64]
 
 
-class Code(NamedTuple):
-    """Machine code of the entries that other entries call, for one arrangement of lanes; whatever the aircraft."""
+class Code:
+    """Machine code of the entries that other entries call, for one arrangement of lanes; whatever the aircraft.
 
-    derivative: Any
-    advance: Any
-    working_state: Any
+    Each is compiled, or taken from its cache, when it is first asked for: a trim makes no steps in time.
+
+    Parameters
+    ----------
+    pattern : Engine
+        Any of the arrangement.
+    """
+
+    def __init__(self, pattern: Engine) -> None:
+        self._pattern = pattern
+
+    @cached_property
+    def derivative(self) -> Any:
+        """`sbs_sim.model.dynamics.derivative`."""
+        engine, tick = self._pattern, self._pattern.tick
+        return address(
+            derivative,
+            *(engine.model, tick.stage, engine.memory(3 * engine.rotors), tick.psi, tick.wind, engine.work),
+            *(tick.slopes[0], True),
+        )
+
+    @cached_property
+    def advance(self) -> Any:
+        """`sbs_sim.model.integrate.advance`."""
+        engine, tick = self._pattern, self._pattern.tick
+        return address(
+            advance,
+            *(self.derivative, engine.model, tick.stage, engine.memory(3 * engine.rotors), tick.psi, 0, 1, 1.0),
+            *(engine.memory(WIND_SIZE), RK4, engine.memory(engine.size + 1), engine.work, tick, tick.done),
+            np.zeros(engine.n, dtype=np.int64),
+        )
+
+    @cached_property
+    def working_state(self) -> Any:
+        """`sbs_sim.model.working_state.working_state`."""
+        engine = self._pattern
+        return address(working_state, engine.model, engine.work, engine.memory(engine.rotors, WORKING_SIZE))
 
 
 class Engine:
@@ -61,22 +96,11 @@ class Engine:
 
     @property
     def code(self) -> Code:
-        """Machine code, compiled when it is first asked for."""
+        """Machine code of this arrangement."""
         arrangement = self.n, self.model.blades["speed"].shape[-1]
         if arrangement not in _codes:
-            _codes[arrangement] = self._compiled()
+            _codes[arrangement] = Code(self)
         return _codes[arrangement]
-
-    def _compiled(self) -> Code:
-        tick, swash = self.tick, self.memory(3 * self.rotors)
-        rates = address(derivative, self.model, tick.stage, swash, tick.psi, tick.wind, self.work, tick.slopes[0], True)
-        step = address(
-            advance,
-            *(rates, self.model, tick.stage, swash, tick.psi, 0, 1, 1.0, self.memory(WIND_SIZE), RK4),
-            *(self.memory(self.size + 1), self.work, tick, tick.done, np.zeros(self.n, dtype=np.int64)),
-        )
-        looks = address(working_state, self.model, self.work, self.memory(self.rotors, WORKING_SIZE))
-        return Code(rates, step, looks)
 
     def average(self, x: Array, swashplate: Array, psi: Array) -> tuple[Array, Array]:
         """Mean over azimuths, shape (count, n_rotors) [rad], in still air.

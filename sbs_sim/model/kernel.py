@@ -15,6 +15,7 @@ import numba
 from llvmlite.binding import executionengine
 from numba.core.registry import cpu_target
 from numba.extending import typeof_impl
+from numba.experimental import function_type as _function_type  # noqa: F401  (teaches numba what an `Address` is)
 from numba.types import WrapperAddressProtocol
 
 from sbs_sim.interruption import raised_outside
@@ -49,7 +50,11 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     if folder is None:
         return _interruptible(numba.njit(**OPTIONS)(function))
     with _cache_in(folder):
-        return _interruptible(numba.njit(cache=True, **OPTIONS)(function))
+        dispatcher = numba.njit(cache=True, **OPTIONS)(function)
+    if not numba.config.DISABLE_JIT:
+        # numba would load first all that it could need to compile, scipy.linalg included, for a quarter of a second
+        dispatcher._cache.load_overload = dispatcher._cache._load_overload
+    return _interruptible(dispatcher)
 
 
 def _interruptible(dispatcher: Any) -> Any:

@@ -6,6 +6,8 @@ given the other's `Address` as an argument.
 """
 
 import contextlib
+import functools
+import gc
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +15,8 @@ from typing import Any
 
 import numba
 from llvmlite.binding import executionengine
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.core.registry import cpu_target
 from numba.extending import typeof_impl
 from numba.experimental import function_type as _function_type  # noqa: F401  (teaches numba what an `Address` is)
@@ -30,15 +34,68 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a piece of the model; it is inlined where it is called and leaves nothing on disk."""
     if numba.config.DISABLE_JIT:
         return function
-    compiled = numba.njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)(function)
-    # without a wrapper there is nothing that Python could call: numba is to hand it nothing
-    compiled.add_overload = lambda made: compiled.overloads.update({tuple(made.signature.args): made})
+    compiled = numba.njit(
+        forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=_Piece, **OPTIONS
+    )(function)
+
+    def add(made: Any) -> None:
+        # callers find it by what Python could call, which it does not have
+        made = made._replace(entry_point=object())
+        made.target_context.insert_user_function(made.entry_point, made.fndesc, [made.library])
+        compiled.overloads[tuple(made.signature.args)] = made
+
+    compiled.add_overload = add
 
     def refuse(*_: Any, **__: Any) -> None:
         raise TypeError(f"{function.__qualname__} is for compiled code: call it from a function that numba compiles")
 
     compiled._compile_for_args = refuse
     return compiled
+
+
+class _PieceLibrary(JITCodeLibrary):
+    """Code of a piece as it was written down: it is optimised, and made machine code, where it is inlined."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+
+class _Piece(Compiler):
+    """numba's compiler for a piece."""
+
+    def __init__(self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, names: Any) -> None:
+        flags.no_compile = True
+        super().__init__(typing, target, _PieceLibrary(target.codegen(), "piece"), args, result, flags, names)
+
+
+class _EntryLibrary(JITCodeLibrary):
+    """Code of an entry with all its pieces, optimised once.
+
+    Once more before that is what numba does for the sake of reference counts, which there are none of. It takes its
+    time, and makes flights slower.
+    """
+
+    def _optimize_final_module(self) -> None:
+        if hasattr(self._codegen, "_mpm_full"):  # until numba 0.61
+            self._codegen._mpm_full.run(self._final_module)
+        else:
+            passes, options = self._codegen._module_pass_manager()
+            passes.run(self._final_module, options)
+
+
+class _Entry(Compiler):
+    """numba's compiler for an entry."""
+
+    def __init__(self, typing: Any, target: Any, library: Any, *others: Any) -> None:
+        library = _EntryLibrary(target.codegen(), "entry")
+        library.enable_object_caching()
+        super().__init__(typing, target, library, *others)
 
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -48,24 +105,41 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     function.__code__ = function.__code__.replace(co_filename=real)
     folder = cache_folder()
     if folder is None:
-        return _interruptible(numba.njit(**OPTIONS)(function))
+        return _prepared(numba.njit(pipeline_class=_Entry, **OPTIONS)(function))
     with _cache_in(folder):
-        dispatcher = numba.njit(cache=True, **OPTIONS)(function)
+        dispatcher = numba.njit(cache=True, pipeline_class=_Entry, **OPTIONS)(function)
     if not numba.config.DISABLE_JIT:
         # numba would load first all that it could need to compile, scipy.linalg included, for a quarter of a second
         dispatcher._cache.load_overload = dispatcher._cache._load_overload
-    return _interruptible(dispatcher)
+    return _prepared(dispatcher)
 
 
-def _interruptible(dispatcher: Any) -> Any:
-    """Let no Ctrl-C be lost while the machine code of a function is compiled or loaded.
+def _prepared(dispatcher: Any) -> Any:
+    """Let no Ctrl-C be lost, and no time, while the machine code of a function is compiled or loaded.
 
     LLVM calls back into Python meanwhile, and an exception that is raised in such a callback has nobody to go to.
     """
     if not numba.config.DISABLE_JIT:
         for name in ("_compile_for_args", "compile"):
-            setattr(dispatcher, name, raised_outside(executionengine.__file__, getattr(dispatcher, name)))
+            work = _without_collection(getattr(dispatcher, name))
+            setattr(dispatcher, name, raised_outside(executionengine.__file__, work))
     return dispatcher
+
+
+def _without_collection(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Function that leaves garbage lie: the compiler makes objects by the million, and next to none in circles."""
+
+    @functools.wraps(function)
+    def call(*arguments: Any, **names: Any) -> Any:
+        if not gc.isenabled():
+            return function(*arguments, **names)
+        gc.disable()
+        try:
+            return function(*arguments, **names)
+        finally:
+            gc.enable()
+
+    return call
 
 
 class Address(WrapperAddressProtocol):

@@ -72,6 +72,34 @@ def test_only_sockets_that_others_reach_count():
     assert listening_beyond() == before
 
 
+def test_who_else_takes_part_in_a_domain_is_known_at_once():
+    """By the port where he listens, before he is discovered; what cannot be known counts as company."""
+    domain = next(DOMAINS)
+    code = """
+import rclpy
+from sbs_sim.nodes import confinement
+confinement.keep_to_this_machine()
+domain = int(__import__("os").environ["ROS_DOMAIN_ID"])
+print(confinement.alone_in_domain(domain), end=" ")
+rclpy.init()
+node = rclpy.create_node("here")
+print(confinement.alone_in_domain(domain), confinement.alone_in_domain(domain + 1))
+"""
+    own = {key: value for key, value in environment(domain).items() if "PROFILES_FILE" not in key}
+
+    def told(reach):
+        changes = {**own, "ROS_AUTOMATIC_DISCOVERY_RANGE": reach}
+        ended = subprocess.run([sys.executable, "-c", code], env=changes, capture_output=True, text=True, check=True)
+        return ended.stdout.strip()
+
+    assert told("LOCALHOST") == "False True False"
+    assert told("SUBNET") == "False False False"
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        # DDSI-RTPS: port 7400 + 250 domain + 10 + 2 participant for what participants tell of themselves
+        other.bind(("127.0.0.1", 7400 + 250 * domain + 10 + 2 * 17))
+        assert told("LOCALHOST") == "False False False"
+
+
 def test_the_user_has_the_last_word_on_the_network(tmp_path):
     """A profile of one's own is taken: here one that gives the participant a name."""
     profile = tmp_path / "own.xml"

@@ -20,6 +20,7 @@ import rclpy.utilities
 
 from sbs_sim.command_line import Parser
 from sbs_sim.errors import SbsError
+from sbs_sim.nodes.confinement import alone_in_domain
 from sbs_sim.nodes.host import DISCOVERY, Component, run
 
 if TYPE_CHECKING:
@@ -101,10 +102,14 @@ class Start:
         check_address(host, port)
         folder = checked_folder(self._options.logs)
         lookout, since = Component("cockpit_lookout"), time.monotonic()
-        from sbs_sim.nodes.cockpit_node import Cockpit  # meanwhile the lookout discovers others
-
         try:
-            if not alone:
+            certain = not alone and alone_in_domain(lookout.context.get_domain_id())
+            if certain:
+                self._simulator = Simulator(self._ros_arguments, self._end)
+            # meanwhile the flight begins, or the lookout discovers others
+            from sbs_sim.nodes.cockpit_node import Cockpit
+
+            if not alone and not certain:
                 _refuse_second_simulator(lookout, since + 2 * DISCOVERY)  # half of it goes by importing
                 self._simulator = Simulator(self._ros_arguments, self._end)
         finally:

@@ -1,7 +1,7 @@
 """Where the model is outside what it describes, in words (theory.md section 6.1)."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,12 +68,12 @@ class WorkingState:
     inflow_state: str
 
 
-def working_state(row: Array) -> WorkingState:
+def working_state(row: Array | Sequence[float]) -> WorkingState:
     """Working state of a rotor.
 
     Parameters
     ----------
-    row : ndarray, shape (WORKING_SIZE,)
+    row : ndarray or sequence of float, shape (WORKING_SIZE,)
         Of `sbs_sim.model.working_state`.
     """
     hover = float(row[W.HOVER_INFLOW])
@@ -91,14 +91,14 @@ def working_state(row: Array) -> WorkingState:
     )
 
 
-def tip_mach(aircraft: Aircraft, rotor: Rotor, row: Array) -> float:
+def tip_mach(aircraft: Aircraft, rotor: Rotor, row: Array | Sequence[float]) -> float:
     """Mach number of the advancing tip: tip speed and velocity along the disc over the speed of sound.
 
     Parameters
     ----------
     aircraft : Aircraft
     rotor : Rotor
-    row : ndarray, shape (WORKING_SIZE,)
+    row : ndarray or sequence of float, shape (WORKING_SIZE,)
         Of `sbs_sim.model.working_state`.
     """
     advancing = rotor.speed * rotor.radius * (1.0 + float(row[W.ADVANCE_RATIO]))
@@ -131,13 +131,13 @@ def inflow_state(descent: float, edgewise: float, with_thrust: bool) -> str:
     return TURBULENT_WAKE if with_thrust or descent < WINDMILL_DESCENT else WINDMILL
 
 
-def warnings(aircraft: Aircraft, rows: Array) -> list[str]:
+def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> list[str]:
     """What is outside the validity of the model, a line each; none of them if all is well.
 
     Parameters
     ----------
     aircraft : Aircraft
-    rows : ndarray, shape (n_rotors, WORKING_SIZE)
+    rows : ndarray or sequences of float, shape (n_rotors, WORKING_SIZE)
         Of `sbs_sim.model.working_state`.
     """
     found = []

@@ -1,8 +1,7 @@
 """Who else is on the topics of a node: others that publish the same, and subscribers that come late."""
 
 from collections import Counter
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 from rclpy.node import Node
 
@@ -54,11 +53,11 @@ class Latecomers:
 
     Parameters
     ----------
-    topics : sequence of (Topic, message)
-        Publishers, and the messages that hold what was published last.
+    topics : sequence of (Topic, callable)
+        Publishers, and what gives the bytes that were published last.
     """
 
-    def __init__(self, topics: Sequence[tuple[Topic, Any]]) -> None:
+    def __init__(self, topics: Sequence[tuple[Topic, Callable[[], bytes]]]) -> None:
         self._topics = topics
         self._known: list[int] = []  # how many listened at the last look
         self._looks = [0] * len(topics)  # that are left until all who came have been told for good
@@ -67,10 +66,10 @@ class Latecomers:
         """Serve who has come since the last look; to be called before whatever is published, by the same thread."""
         listening = [topic.subscribers for topic, _ in self._topics]
         if paused and self._known:
-            for i, (topic, message) in enumerate(self._topics):
+            for i, (topic, last) in enumerate(self._topics):
                 if listening[i] > self._known[i]:
                     self._looks[i] = AGAIN + 1
                 if self._looks[i] in (AGAIN + 1, 1):
-                    topic.publish_again(message)
+                    topic.publish_again(last())
                 self._looks[i] = max(self._looks[i] - 1, 0)
         self._known = listening

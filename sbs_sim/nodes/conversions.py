@@ -37,7 +37,7 @@ from sbs_msgs.msg import (
 from sbs_msgs.msg import Wind as WindMessage
 from sbs_msgs.srv import SetWind
 from sbs_sim import validity
-from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft import Aircraft, Rotor
 from sbs_sim.analysis import linearize, modes, sweep, trim
 from sbs_sim.engine import Engine
 from sbs_sim.errors import SimulationError
@@ -45,8 +45,10 @@ from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
+from sbs_sim.model.multiblade import blade_matrix
+from sbs_sim.model.state import harmonic_count
 from sbs_sim.model.wind import LARGEST_WIND, Wind
-from sbs_sim.simulation import Event, Snapshot, blade_angles, trimmed_state
+from sbs_sim.simulation import Event, Snapshot, trimmed_state
 
 Array = NDArray[np.float64]
 
@@ -54,6 +56,7 @@ FRAME_NED = "ned"
 FRAME_BODY = "base_link_frd"
 FRAME_ODOM = "odom"
 FRAME_BASE = "base_link"
+BLADE_FIELDS = ("flap", "flap_rate", "lag", "lag_rate", "blade_flap", "blade_lag")
 HALF = math.sqrt(0.5)
 LARGEST = 1e9  # of any number of a flight that can be shown
 DEFAULT_TURBULENCE_LENGTH = 50.0  # m
@@ -168,20 +171,62 @@ def fill_working_states(status: SimulationStatus, aircraft: Aircraft, snapshot: 
     """Fill in what the rotors are made to do, and what of that is outside the validity of the model."""
     if snapshot.working is None:
         return
-    states = [validity.working_state(row) for row in snapshot.working]
-    status.warnings = validity.warnings(aircraft, snapshot.working)
-    status.working_states = [
-        WorkingState(
-            advance_ratio=state.advance_ratio,
-            descent_ratio=state.descent_ratio,
-            stalled_share=state.stalled_share,
-            reversed_share=state.reversed_share,
-            inflow_state=validity.INFLOW_STATES.index(state.inflow_state),
-            tip_mach=validity.tip_mach(aircraft, rotor, row),
-            outside_share=state.outside_share,
-        )
-        for rotor, row, state in zip(aircraft.rotors, snapshot.working, states, strict=True)
-    ]
+    rows = snapshot.working.tolist()  # numbers of Python are much faster to ask for one by one
+    status.warnings = validity.warnings(aircraft, rows)
+    if len(status.working_states) != len(rows):
+        status.working_states = [WorkingState() for _ in rows]
+    for rotor, row, told in zip(aircraft.rotors, rows, status.working_states, strict=True):
+        state = validity.working_state(row)
+        told.advance_ratio, told.descent_ratio = state.advance_ratio, state.descent_ratio
+        told.stalled_share, told.reversed_share = state.stalled_share, state.reversed_share
+        told.outside_share, told.tip_mach = state.outside_share, validity.tip_mach(aircraft, rotor, row)
+        told.inflow_state = validity.INFLOW_STATES.index(state.inflow_state)
+
+
+class BladeAngles:
+    """Flap and lag angles of all blades, as `sbs_sim.simulation.blade_angles` gives them; in memory of its own.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    """
+
+    def __init__(self, aircraft: Aircraft) -> None:
+        blades = aircraft.layout.blades
+        self._angles = np.empty((2, sum(blades)))
+        self._alike = [_BladesAlike(aircraft, count) for count in dict.fromkeys(blades)]
+
+    def of(self, snapshot: Snapshot) -> Array:
+        """Flap and lag [rad], shape (2, blades of all rotors): rotor after rotor, valid until the next call."""
+        for alike in self._alike:
+            self._angles[:, alike.places] = alike.of(snapshot)
+        return self._angles
+
+
+class _BladesAlike:
+    """Blades of all rotors that have as many: their matrices are filled in together, see `blade_matrix`."""
+
+    def __init__(self, aircraft: Aircraft, count: int) -> None:
+        layout = aircraft.layout
+        firsts = np.cumsum([0, *layout.blades])
+        self._rotors = np.array([j for j, blades in enumerate(layout.blades) if blades == count])
+        self.places = np.array([firsts[j] + k for j in self._rotors for k in range(count)])
+        coordinates = [(layout.flap(j), layout.lag(j)) for j in self._rotors.tolist()]
+        order = np.arange(layout.size)
+        self._coordinates = np.array([np.stack([order[flap], order[lag]], axis=-1) for flap, lag in coordinates])
+        self._matrices = np.array([blade_matrix(count, 0.0) for _ in coordinates])
+        self._behind = 2 * math.pi * np.arange(count) / count
+        self._harmonics = np.arange(1, harmonic_count(count) + 1)
+        last = 1 + 2 * len(self._harmonics)
+        self._cosines, self._sines = self._matrices[..., 1:last:2], self._matrices[..., 2:last:2]
+
+    def of(self, snapshot: Snapshot) -> Array:
+        psi = snapshot.azimuth[self._rotors, np.newaxis] + self._behind
+        angles = psi[..., np.newaxis] * self._harmonics
+        np.negative(np.cos(angles), out=self._cosines)
+        np.negative(np.sin(angles), out=self._sines)
+        found: Array = (self._matrices @ snapshot.state[self._coordinates]).reshape(-1, 2)
+        return found.T
 
 
 class StateMessages:
@@ -195,10 +240,12 @@ class StateMessages:
     def __init__(self, aircraft: Aircraft) -> None:
         self._aircraft = aircraft
         self._layout = aircraft.layout
+        self._blades = BladeAngles(aircraft)
+        self._firsts = np.cumsum([0, *aircraft.layout.blades]).tolist()
         count = len(aircraft.rotors)
         self.state = BodyState()
         self.state.header.frame_id = FRAME_NED
-        self.rotors = RotorStateArray(rotors=[RotorState(speed=rotor.speed) for rotor in aircraft.rotors])
+        self.rotors = RotorStateArray(rotors=[_rotor_at_rest(rotor) for rotor in aircraft.rotors])
         self.rotors.header.frame_id = FRAME_BODY
         self.inflow = InflowArray(rotors=[Inflow() for _ in range(count)])
         self.inflow.header.frame_id = FRAME_BODY
@@ -213,13 +260,14 @@ class StateMessages:
         values = snapshot.state.tolist()
         self._fill_state(values, snapshot.acceleration.tolist())
         self._fill_odom(values)
-        angles = blade_angles(self._aircraft, snapshot)
+        flaps, lags = self._blades.of(snapshot)
         loads = snapshot.loads.tolist()
         azimuth = snapshot.azimuth.tolist()
         for j, rotor in enumerate(self.rotors.rotors):
             rotor.azimuth = azimuth[j]
             self._fill_rotor(rotor, j, snapshot.state, loads[j])
-            rotor.blade_flap, rotor.blade_lag = _doubles(angles[j][0]), _doubles(angles[j][1])
+            own = slice(self._firsts[j], self._firsts[j + 1])
+            rotor.blade_flap, rotor.blade_lag = _doubles(flaps[own]), _doubles(lags[own])
             inflow = self.inflow.rotors[j]
             inflow.uniform, inflow.sine, inflow.cosine = values[self._layout.inflow(j)]
 
@@ -251,6 +299,12 @@ class StateMessages:
         u, v, w, p, q, r = values[7:13]
         _set_vector(twist.linear, (u, -v, -w))
         _set_vector(twist.angular, (p, -q, -r))
+
+
+def _rotor_at_rest(rotor: Rotor) -> RotorState:
+    """Message of a rotor with a number for every blade."""
+    still = {name: _doubles(np.zeros(rotor.blades)) for name in BLADE_FIELDS}
+    return RotorState(speed=rotor.speed, **still)
 
 
 def enu_flu_quaternion(ned_frd: Sequence[float]) -> tuple[float, float, float, float]:

@@ -99,13 +99,16 @@ class Topic:
 
     def publish(self, message: Any, time: float, wait: bool = False, essential: bool = False) -> None:
         """Publish a message of a simulation time [s]; for `wait` and `essential` see `LogWriter.write`."""
-        data = serialize_message(message)
-        self._publisher.publish(data)
-        self._write(data, time, wait, essential)
+        self.publish_bytes(serialize_message(message), time, wait, essential)
 
-    def publish_again(self, message: Any) -> None:
-        """Publish a message that is in the log already."""
-        self._publisher.publish(message)
+    def publish_bytes(self, data: bytes, time: float, wait: bool = False, essential: bool = False) -> None:
+        """Publish a message that is serialised."""
+        self._publisher.publish(data)
+        self.record_bytes(data, time, wait, essential)
+
+    def publish_again(self, data: bytes) -> None:
+        """Publish a serialised message that is in the log already."""
+        self._publisher.publish(data)
 
     @property
     def name(self) -> str:
@@ -119,9 +122,10 @@ class Topic:
 
     def record(self, message: Any, time: float, wait: bool = False, essential: bool = False) -> None:
         """Write a message into the log alone."""
-        self._write(serialize_message(message), time, wait, essential)
+        self.record_bytes(serialize_message(message), time, wait, essential)
 
-    def _write(self, data: bytes, time: float, wait: bool, essential: bool) -> None:
+    def record_bytes(self, data: bytes, time: float, wait: bool = False, essential: bool = False) -> None:
+        """Write a serialised message into the log alone."""
         if self._log is not None:
             self._log.write(self._channel, time, data, wait, essential)
 

@@ -4,6 +4,7 @@ import contextlib
 import math
 import threading
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -17,8 +18,9 @@ from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray, S
 from sbs_sim.flight_loop import FlightLoop, Report
 from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.company import Latecomers, Rivals
-from sbs_sim.nodes.conversions import StateMessages, event_message, fill_working_states, to_time
+from sbs_sim.nodes.conversions import event_message, fill_working_states, to_time
 from sbs_sim.nodes.host import COMPLAINT_PERIOD, EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Topic, diagnostic
+from sbs_sim.nodes.state_bytes import StatusBytes, states_of
 from sbs_sim.simulation import Event
 
 HEARTBEAT = 1.0  # s of wall time between status and /clock of a flight at rest
@@ -46,17 +48,18 @@ class Outputs:
         self._node, self._loop, self._arrivals, self._log = node, loop, arrivals, log
         self._log_fault_said = ""
         self._begun = False  # the start of the flight is published
-        self._messages = StateMessages(loop.aircraft)
+        self._states = states = states_of(loop.aircraft, node.get_logger().warning)
+        self._status_bytes = StatusBytes(node.get_logger().warning)
         self._clock_message, self._status = Clock(), SimulationStatus()
         self._last_report: Report | None = None
         self._warned: list[str] = []
         self._told: tuple[Any, ...] = ()  # what may be new though the aircraft has not moved
         self._told_at = -math.inf
         self._of_snapshots = (
-            (Topic(node, BodyState, "state", STATE_QOS, log), self._messages.state),
-            (Topic(node, RotorStateArray, "rotors", STATE_QOS, log), self._messages.rotors),
-            (Topic(node, InflowArray, "inflow", STATE_QOS, log), self._messages.inflow),
-            (Topic(node, Odometry, "odom", STATE_QOS, log), self._messages.odom),
+            (Topic(node, BodyState, "state", STATE_QOS, log), partial(states.data, "state")),
+            (Topic(node, RotorStateArray, "rotors", STATE_QOS, log), partial(states.data, "rotors")),
+            (Topic(node, InflowArray, "inflow", STATE_QOS, log), partial(states.data, "inflow")),
+            (Topic(node, Odometry, "odom", STATE_QOS, log), partial(states.data, "odom")),
         )
         self._clock = Topic(node, Clock, "clock", STATE_QOS, log)
         self._events = Topic(node, FlightEvent, "events", EVENT_QOS, log)
@@ -93,10 +96,10 @@ class Outputs:
         for event in report.events:
             self._tell_event(event, now, wait)
         if report.snapshot is not None:
-            self._messages.fill(report.snapshot)
-            for topic, message in self._of_snapshots:
-                (topic.record if report.repeated else topic.publish)(message, now, wait)
-        self._status_topic.publish(self._status, now, wait)
+            self._states.fill(report.snapshot)
+            for topic, data in self._of_snapshots:
+                (topic.record_bytes if report.repeated else topic.publish_bytes)(data(), now, wait)
+        self._status_topic.publish_bytes(self._status_bytes.data(self._status), now, wait)
 
     def _tell_event(self, event: Event, now: float, wait: bool) -> None:
         """Publish and record an event: no flight can be flown again without it."""

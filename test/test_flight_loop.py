@@ -566,6 +566,127 @@ def test_as_fast_as_read_a_flight_without_a_reader_waits_and_answers(simulation)
     assert reader.newest().dropped == 0
 
 
+# -- a reader in the flight's own thread -------------------------------------------------------------
+
+
+class Taker(Reader):
+    """Reads as a publisher does: from the queue, and in the flight's thread where that would wait for it."""
+
+    def __init__(self, loop):
+        super().__init__(loop)
+        self.threads, self.refuses = [], False
+        loop.read_by(self.take)
+
+    def run(self):
+        while (report := self.loop.reports.get()) is not None:
+            time.sleep(0.001)  # what comes now must not overtake
+            self.add(report)
+            self.loop.reports.task_done()
+        self.ended = True
+
+    def take(self, report):
+        if not self.refuses:
+            self.add(report)
+        return not self.refuses
+
+    def add(self, report):
+        self.reports.append(report)
+        self.threads.append(threading.current_thread().name)
+
+
+@contextlib.contextmanager
+def taken(simulation, **options):
+    loop = FlightLoop(simulation, **options)
+    reader = Taker(loop)
+    loop.start()
+    reader.start()
+    try:
+        yield loop, reader
+    finally:
+        loop.stop()
+        reader.join(PATIENCE)
+        assert reader.ended
+
+
+def assert_all_ticks(reader, tick):
+    """Every tick was reported once, in order, with nothing lost."""
+    steps = [snapshot.step for snapshot in reader.snapshots()]
+    assert steps == [i * tick for i in range(len(steps))]
+    assert reader.newest().dropped == 0
+
+
+def test_as_fast_as_read_the_flight_hands_out_reports_in_its_own_thread_and_in_order(simulation):
+    with taken(simulation, real_time_factor=AS_FAST_AS_READ) as (loop, reader):
+        wait_until(lambda: len(reader.reports) > 200)
+        loop.pause(True)
+        wait_until(lambda: not reader.newest().playing)
+        loop.pause(False)
+        before = len(reader.reports)
+        wait_until(lambda: len(reader.reports) > before + 50)
+    assert reader.threads.count("flight") > 200
+    assert_all_ticks(reader, simulation.steps_per_tick)
+
+
+def test_reports_that_a_reader_cannot_take_now_wait_in_the_queue(simulation):
+    with taken(simulation, real_time_factor=AS_FAST_AS_READ) as (loop, reader):
+        wait_until(lambda: "flight" in reader.threads)
+        reader.refuses = True
+        loop.call(lambda: None)
+        before = len(reader.reports)
+        wait_until(lambda: len(reader.reports) > before + 20)
+        assert "flight" not in reader.threads[before + 1 :]
+        reader.refuses = False
+        before = len(reader.reports)
+        wait_until(lambda: "flight" in reader.threads[before:])
+    assert_all_ticks(reader, simulation.steps_per_tick)
+
+
+def test_in_real_time_the_flight_does_not_wait_for_its_reader(simulation):
+    with taken(simulation, real_time_factor=1.0) as (_, reader):
+        wait_until(lambda: len(reader.reports) > 20)
+        assert "flight" not in reader.threads
+    assert_all_ticks(reader, simulation.steps_per_tick)
+
+
+def test_many_steps_are_reported_one_by_one_and_let_others_in(simulation):
+    with taken(simulation, real_time_factor=1e-5) as (loop, reader):
+        loop.pause(True)
+        first, tick = loop.call(lambda: simulation.step), simulation.steps_per_tick
+        begun, met = threading.Event(), []
+        take = reader.take
+
+        def watch(report):
+            if report.step > first + 5 * tick:
+                begun.set()
+                time.sleep(0.001)  # steps on a slow machine
+            return take(report)
+
+        loop.read_by(watch)
+        stepper = threading.Thread(target=lambda: loop.step(400), daemon=True)
+        stepper.start()
+        assert begun.wait(PATIENCE)
+        loop.call(lambda: met.append(simulation.step))
+        stepper.join(PATIENCE)
+        assert not stepper.is_alive()
+        assert loop.call(lambda: simulation.step) == first + 400 * tick
+        assert first + 5 * tick < met[0] < first + 400 * tick
+    assert_all_ticks(reader, tick)
+
+
+def test_stop_in_the_middle_of_many_steps(simulation):
+    with taken(simulation, real_time_factor=1e-5) as (loop, reader):
+        loop.pause(True)
+        lines = []
+        stepper = threading.Thread(target=lambda: lines.append(refusal(loop.step, 1000)), daemon=True)
+        take = reader.take
+        loop.read_by(lambda report: time.sleep(0.002) or take(report))
+        stepper.start()
+        wait_until(lambda: simulation.step > 10 * simulation.steps_per_tick)
+        stop_in_time(loop)
+        stepper.join(PATIENCE)
+        assert lines == ["the flight has ended"]
+
+
 # -- the end -----------------------------------------------------------------------------------------
 
 

@@ -1,9 +1,13 @@
-"""What the simulator publishes: a thread that turns the reports of a flight into messages."""
+"""What the simulator publishes: a thread that turns the reports of a flight into messages.
+
+Where the flight waits for that anyway (it is stepped, or flies as fast as it can be published), it does so itself.
+"""
 
 import contextlib
 import math
 import threading
 import time
+import traceback
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +74,7 @@ class Outputs:
         self._latecomers = Latecomers(self._of_snapshots)
         steady = SteadyClock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(HEALTH_PERIOD, self._publish_health, clock=steady)
+        loop.read_by(self._take)
         self._thread = threading.Thread(target=self._publish_all, name="publisher", daemon=True)
         self._thread.start()
 
@@ -79,6 +84,19 @@ class Outputs:
 
     def _publish_all(self) -> None:
         while (report := self._loop.reports.get()) is not None:
+            self._tell(report)
+            self._loop.reports.task_done()
+
+    def _take(self, report: Report) -> bool:
+        """Publish in the flight's thread, if the log will not hold it up: else nobody could stop the flight."""
+        if self._log is not None and not self._log.has_room:
+            return False
+        self._tell(report)
+        return True
+
+    def _tell(self, report: Report) -> None:
+        """Publish what a report tells, if it is due; an error of ours ends neither the flight nor the publishing."""
+        try:
             self._say_changes(report)
             self._last_report = report
             self._fill_status(report)
@@ -86,6 +104,10 @@ class Outputs:
             if self._is_due(report):
                 with contextlib.nullcontext() if self._log is None else self._log.instant():
                     self._publish(report)
+        except Exception:
+            self._node.get_logger().error(
+                f"internal error: {traceback.format_exc()}", throttle_duration_sec=COMPLAINT_PERIOD
+            )
 
     def _publish(self, report: Report) -> None:
         """Publish and record all that a report tells."""

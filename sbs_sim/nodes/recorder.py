@@ -65,6 +65,11 @@ class Recorder:
         return self._writer.path
 
     @property
+    def has_room(self) -> bool:
+        """See `LogWriter.has_room`."""
+        return self._writer.has_room
+
+    @property
     def dropped(self) -> int:
         """Messages that did not get into the log."""
         return self._writer.dropped

@@ -100,6 +100,11 @@ class Recording(Component):
                 self._has_begun.set()
 
     @property
+    def has_room(self) -> bool:
+        """True if what belongs to an instant can be written without waiting, or there is no log."""
+        return (log := self._log) is None or log.has_room
+
+    @property
     def path(self) -> str:
         """The present log; empty if there is none."""
         return "" if (log := self._log) is None else str(log.path)

@@ -150,6 +150,11 @@ class LogWriter:
         """See the class."""
         return self._file.path
 
+    @property
+    def has_room(self) -> bool:
+        """True while the queue is at most half full: a hundred messages find room without waiting."""
+        return len(self._queue) <= self._half_full
+
     def _metadata(self, name: str, data: Mapping[str, str]) -> bytes:
         return self._builder.metadata(name, {RECORDING_ID: self.recording_id, **data})
 

@@ -1,5 +1,12 @@
-"""Load, deadlines, regularity and latency of the simulator in a process of its own."""
+"""Load, deadlines, regularity and latency of the simulator in a process of its own.
 
+    ./run python benchmarks/node_rows.py [--seconds 10]
+
+prints the rows of a thousand ticks per second, of lock-step and of discovery alone.
+"""
+
+import argparse
+import contextlib
 import math
 import os
 import signal
@@ -8,6 +15,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +26,34 @@ from sbs_sim import Aircraft, trim
 
 SIMULATOR = Path(__file__).resolve().parent.parent / "install" / "sbs_sim" / "lib" / "sbs_sim" / "simulator"
 Row = tuple[str, float, str, str]
+SILENT = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+FAST = 1000.0  # ticks per second
+DISCOVERIES = 20
+# What another process does: from its node to the first state that it gets, and whatever it prints.
+NEWCOMER = """
+import time
+import rclpy
+from sbs_msgs.msg import BodyState
+rclpy.init()
+begin = time.perf_counter()
+node, came = rclpy.create_node("newcomer"), []
+node.create_subscription(BodyState, "state", came.append, 10)
+while not came:
+    rclpy.spin_once(node, timeout_sec=0.01)
+print(time.perf_counter() - begin)
+"""
 
 
 class Watch:
-    """Counts what a running simulator publishes."""
+    """Counts what a running simulator publishes.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    light : bool
+        Neither rotors nor inflow, and states are not read: so that the watch does not need a core of its own.
+    """
+
+    def __init__(self, light: bool = False) -> None:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
@@ -35,9 +65,9 @@ class Watch:
         self.status: Any = None
         self.acceleration = 0.0
         self.counts = {"rotors": 0, "inflow": 0}
-        self.node.create_subscription(BodyState, "state", self._on_state, 10)
+        self.node.create_subscription(BodyState, "state", self._on_bytes if light else self._on_state, 10, raw=light)
         self.node.create_subscription(SimulationStatus, "status", self._on_status, 10)
-        for topic, kind in (("rotors", RotorStateArray), ("inflow", InflowArray)):
+        for topic, kind in () if light else (("rotors", RotorStateArray), ("inflow", InflowArray)):
             self.node.create_subscription(kind, topic, lambda _, topic=topic: self._count(topic), 10)
         self.pilot = self.node.create_publisher(Controls, "controls", 1)
         self._executor = SingleThreadedExecutor()
@@ -48,6 +78,9 @@ class Watch:
     def _on_state(self, message: Any) -> None:
         self.arrivals.append(time.perf_counter())
         self.acceleration = message.acceleration.z
+
+    def _on_bytes(self, _: bytes) -> None:
+        self.arrivals.append(time.perf_counter())
 
     def _on_status(self, message: Any) -> None:
         self.status = message
@@ -71,14 +104,91 @@ def node_rows(seconds: float, memory_minutes: float) -> list[Row]:
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     watch = Watch()
     with tempfile.TemporaryDirectory() as bags:
-        return _rows(watch, seconds, memory_minutes, {**os.environ, "SBS_SIM_BAGS": bags})
+        environment = {**os.environ, "SBS_SIM_BAGS": bags}
+        try:
+            return [*_rows(watch, seconds, memory_minutes, environment), *_fast_rows(watch, seconds, environment)]
+        finally:
+            watch.close()
+
+
+def fast_rows(seconds: float) -> list[Row]:
+    """A thousand ticks per second, lock-step and discovery."""
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    watch = Watch(light=True)
+    with tempfile.TemporaryDirectory() as bags:
+        try:
+            return _fast_rows(watch, seconds, {**os.environ, "SBS_SIM_BAGS": bags})
+        finally:
+            watch.close()
+
+
+@contextlib.contextmanager
+def flying(watch: Watch, environment: dict[str, str], **parameters: float) -> Iterator[psutil.Process]:
+    """A simulator whose states arrive."""
+    given = [part for name, value in parameters.items() for part in ("-p", f"{name}:={value}")]
+    watch.arrivals.clear()
+    command = [sys.executable, str(SIMULATOR), "--ros-args", *given]
+    process = subprocess.Popen(command, env=environment, **SILENT)
+    try:
+        while not watch.arrivals:
+            if process.poll() is not None:
+                raise RuntimeError(f"the simulator has ended with {process.returncode}")
+            time.sleep(0.01)
+        time.sleep(3.0)
+        yield psutil.Process(process.pid)
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(20)
+
+
+def _fast_rows(watch: Watch, seconds: float, environment: dict[str, str]) -> list[Row]:
+    with flying(watch, environment, publish_rate=FAST) as process:
+        rows = [(name.replace("node", "node at 1 kHz"), *rest) for name, *rest in steady_rows(watch, process, seconds)]
+    with flying(watch, environment) as process:
+        return [*rows, *discovery_rows(environment), *step_rows(watch, process, seconds)]
+
+
+def discovery_rows(environment: dict[str, str]) -> list[Row]:
+    """From the node of another process to the first state that it receives."""
+    times = []
+    for _ in range(DISCOVERIES):
+        done = subprocess.run([sys.executable, "-c", NEWCOMER], env=environment, capture_output=True, timeout=60)
+        times.append(float(done.stdout))
+    return [
+        ("node: discovered p50", float(np.median(times)), "s", "from another process's node to its first state"),
+        ("node: discovered max", max(times), "s", f"of {DISCOVERIES}"),
+    ]
+
+
+def step_rows(watch: Watch, process: psutil.Process, seconds: float) -> list[Row]:
+    """Lock-step: a client that pauses the flight and has it fly ticks, one or many with every request."""
+    from std_srvs.srv import SetBool
+
+    from sbs_msgs.srv import Step
+
+    pause, step = watch.node.create_client(SetBool, "pause"), watch.node.create_client(Step, "step")
+    pause.wait_for_service(10.0)
+    step.wait_for_service(10.0)
+    pause.call(SetBool.Request(data=True), timeout_sec=10.0)
+    rows: list[Row] = []
+    for ticks in (1, 1000):
+        flown, begin, before = 0, time.perf_counter(), process.cpu_times()
+        while (wall := time.perf_counter() - begin) < seconds:
+            answer = step.call(Step.Request(ticks=ticks), timeout_sec=60.0)
+            if answer is None or not answer.success:
+                raise RuntimeError(f"step: {answer.message if answer else 'no answer'}")
+            flown += ticks
+        after = process.cpu_times()
+        busy = 1e6 * (after.user + after.system - before.user - before.system) / flown
+        rows.append((f"node: stepped by {ticks}", flown / wall, "ticks/s", f"{busy:.0f} us of a core per tick"))
+    return rows
 
 
 def _rows(watch: Watch, seconds: float, memory_minutes: float, environment: dict[str, str]) -> list[Row]:
     """From the start of the process to its end."""
     begin = time.perf_counter()
-    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    process = subprocess.Popen([sys.executable, str(SIMULATOR)], env=environment, **silent)
+    process = subprocess.Popen([sys.executable, str(SIMULATOR)], env=environment, **SILENT)
     try:
         while not watch.arrivals:
             time.sleep(0.002)
@@ -92,7 +202,6 @@ def _rows(watch: Watch, seconds: float, memory_minutes: float, environment: dict
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(20)
-        watch.close()
     return rows
 
 
@@ -179,3 +288,15 @@ def memory_rows(process: psutil.Process, minutes: float, age: float) -> list[Row
         ("node: memory early", early, "MiB", "after 1 minute or the figures above"),
         ("node: memory late", late, "MiB", f"{minutes - 1.0:g} minutes later, {late - early:+.2f} MiB"),
     ]
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=10.0, help="of wall time for every row")
+    for name, value, unit, note in fast_rows(parser.parse_args().seconds):
+        print(f"{name:34} {value:10.4g} {unit:8} {note}")
+
+
+if __name__ == "__main__":
+    main()

@@ -29,6 +29,7 @@ Row = tuple[str, float, str, str]
 SILENT = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 FAST = 1000.0  # ticks per second
 DISCOVERIES = 20
+LEFT_ALONE = 2000  # ticks that nobody steers: in a hundred seconds it comes down to the ground
 # What another process does: from its node to the first state that it gets, and whatever it prints.
 NEWCOMER = """
 import time
@@ -165,16 +166,19 @@ def step_rows(watch: Watch, process: psutil.Process, seconds: float) -> list[Row
     """Lock-step: a client that pauses the flight and has it fly ticks, one or many with every request."""
     from std_srvs.srv import SetBool
 
-    from sbs_msgs.srv import Step
+    from sbs_msgs.srv import Reset, Step
 
-    pause, step = watch.node.create_client(SetBool, "pause"), watch.node.create_client(Step, "step")
-    pause.wait_for_service(10.0)
-    step.wait_for_service(10.0)
+    kinds = {"pause": SetBool, "step": Step, "reset": Reset}
+    pause, step, reset = (watch.node.create_client(kind, name) for name, kind in kinds.items())
+    for client in (pause, step, reset):
+        client.wait_for_service(10.0)
     pause.call(SetBool.Request(data=True), timeout_sec=10.0)
     rows: list[Row] = []
     for ticks in (1, 1000):
         flown, begin, before = 0, time.perf_counter(), process.cpu_times()
         while (wall := time.perf_counter() - begin) < seconds:
+            if flown % LEFT_ALONE == 0:
+                reset.call(Reset.Request(), timeout_sec=10.0)
             answer = step.call(Step.Request(ticks=ticks), timeout_sec=60.0)
             if answer is None or not answer.success:
                 raise RuntimeError(f"step: {answer.message if answer else 'no answer'}")

@@ -423,17 +423,12 @@ class Aircraft(ByContent):
         return self._arrangements[key]
 
     @cached_property
-    def rotor_matrices(self) -> dict[tuple[bool, bool, float], Any]:
-        """What `sbs_sim.rotor_matrices` has worked out of this aircraft."""
-        return {}
-
-    @cached_property
     def _arrangements(self) -> dict[tuple[bool, bool, str], Model]:
         return {}
 
     @cached_property
     def kept(self) -> dict[Any, Any]:
-        """What searches for trims keep: rotors by momentum theory, and hovers, from which all other flights begin."""
+        """What is worked out once: rotors by momentum theory, hovers that trims begin from, matrices of `etd`."""
         return {}
 
     @cached_property

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.engine import Engine
+from sbs_sim.engine import points_engine
 from sbs_sim.model import state as S
 from sbs_sim.model.exponential import coefficients
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
@@ -48,13 +48,14 @@ def rotor_matrices(aircraft: "Aircraft", lead_lag: bool, cyclic_inflow: bool, st
     The rates of a rotor's flap, lag and inflow are linearized where it carries its share of the weight in level rest.
     There the multiblade coordinates of one harmonic depend on one another alone, and not on the azimuth.
     """
-    key = lead_lag, cyclic_inflow, step
-    if key not in aircraft.rotor_matrices:
+    key = RotorMatrices, lead_lag, cyclic_inflow, step
+    if key not in aircraft.kept:
         rates, blocks = _rates_by_states(aircraft, lead_lag, cyclic_inflow), _blocks(aircraft)
         linear = [np.ascontiguousarray(rates[np.ix_(block, block)]) for block in blocks]
         found = [coefficients(own, step) for own in linear]
-        aircraft.rotor_matrices[key] = RotorMatrices(blocks, linear, found)
-    return aircraft.rotor_matrices[key]
+        aircraft.kept[key] = RotorMatrices(blocks, linear, found)
+    kept: RotorMatrices = aircraft.kept[key]
+    return kept
 
 
 def arranged(parts: Sequence[RotorMatrices | None]) -> Exponential | None:
@@ -80,7 +81,7 @@ def _blocks(aircraft: "Aircraft") -> list[list[int]]:
 
 def _rates_by_states(aircraft: "Aircraft", lead_lag: bool, cyclic_inflow: bool) -> Array:
     """Derivatives of the rates of the simulation state by the states of rotors, shape (size, size); others are zero."""
-    engine, layout = Engine(aircraft.arranged(lead_lag, cyclic_inflow, "points")), aircraft.layout
+    engine, layout = points_engine(aircraft.arranged(lead_lag, cyclic_inflow, "points")), aircraft.layout
     size, rotors = layout.linear_size, len(aircraft.rotors)
     point = np.zeros(size + len(S.SWASHPLATE_NAMES) * rotors)
     steps, offset = np.zeros(len(point)), S.BODY_SIZE - S.LINEAR_BODY_SIZE
@@ -92,11 +93,13 @@ def _rates_by_states(aircraft: "Aircraft", lead_lag: bool, cyclic_inflow: bool) 
         for part in (layout.flap_rate(j), layout.lag_rate(j)):
             steps[part.start - offset : part.stop - offset] = ANGLE_STEP * rotor.speed
         steps[layout.inflow(j).start - offset : layout.inflow(j).stop - offset] = INFLOW_STEP
-    outputs = size + SPECIFIC_FORCE_SIZE + LOAD_SIZE * rotors
+    outputs, angles = size + SPECIFIC_FORCE_SIZE + LOAD_SIZE * rotors, len(point) - size
     found = np.zeros((1, len(point), outputs))
+    owners = np.append(layout.linear_owners, np.full(angles, rotors))
     jacobian(
-        *(engine.code.derivative, engine.model, point, np.eye(len(point) - size), steps, np.zeros((1, rotors))),
-        *(engine.work, engine.tick, engine.memory(len(point)), np.zeros((engine.n + 1, outputs)), found),
+        *(engine.code.derivative, engine.model, point, np.eye(angles), steps, owners, np.zeros((1, rotors))),
+        *(engine.work, engine.tick, engine.memory(len(point)), np.zeros((2, outputs))),
+        *(np.zeros(engine.n, dtype=np.int64), found),
     )
     linear = np.zeros((layout.size, layout.size))
     first = S.LINEAR_BODY_SIZE

@@ -118,7 +118,11 @@ def test_nothing_is_lost_at_the_end_of_a_flight_that_is_faster_than_its_reader(s
     assert_flown_again(sbs, reader)
 
 
-OPTIONS = [{"azimuth_step": math.radians(2.0)}, {"method": "partitioned", "azimuth_step": math.radians(5.0)}, {"lead_lag": False}]
+OPTIONS = [
+    {"azimuth_step": math.radians(2.0)},
+    {"method": "partitioned", "azimuth_step": math.radians(5.0)},
+    {"lead_lag": False},
+]
 
 
 @pytest.mark.parametrize("options", OPTIONS)

@@ -410,7 +410,7 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
             inputs,
             aircraft.mixing,
             np.where(used, steps, 0.0),
-            _owners(aircraft),
+            np.append(aircraft.layout.linear_owners, np.full(len(S.CONTROL_NAMES), engine.rotors)),
             psi,
             engine.work,
             engine.tick,
@@ -418,13 +418,6 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
         *(engine.memory(len(inputs)), np.zeros((2, outputs)), np.zeros(engine.n, dtype=np.int64), result),
     )
     return result.transpose(0, 2, 1)
-
-
-def _owners(aircraft: Aircraft) -> NDArray[np.int64]:
-    """Numbers of the rotors that linear states belong to; that of all rotors for those of the body and controls."""
-    count = len(aircraft.rotors)
-    rotors = [S.part_of(name).rotor for name in aircraft.layout.linear_names]
-    return np.array([count if rotor < 0 else rotor for rotor in rotors] + [count] * len(S.CONTROL_NAMES))
 
 
 def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> LinearModel:

@@ -18,8 +18,8 @@ from llvmlite.binding import executionengine
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import cpu_target
-from numba.extending import typeof_impl
 from numba.experimental import function_type as _function_type  # noqa: F401  (teaches numba what an `Address` is)
+from numba.extending import typeof_impl
 from numba.types import WrapperAddressProtocol
 
 from sbs_sim.interruption import raised_outside

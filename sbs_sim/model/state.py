@@ -184,6 +184,12 @@ class StateLayout:
         return LINEAR_BODY_UNITS + angles + rates + angles + rates + ("1",) * (3 * len(self.blades))
 
     @cached_property
+    def linear_owners(self) -> NDArray[np.int64]:
+        """Number of the rotor that each linear state belongs to; that of all rotors for those of the body."""
+        rotors = [part_of(name).rotor for name in self.linear_names]
+        return np.array([len(self.blades) if rotor < 0 else rotor for rotor in rotors])
+
+    @cached_property
     def _rotor_names(self) -> tuple[str, ...]:
         flap = ("a", "b")
         names: list[str] = []

@@ -65,7 +65,7 @@ class Watch:
         self.arrivals: list[float] = []
         self.status: Any = None
         self.acceleration = 0.0
-        self.counts = {"rotors": 0, "inflow": 0}
+        self.counts = {} if light else {"rotors": 0, "inflow": 0}
         self.node.create_subscription(BodyState, "state", self._on_bytes if light else self._on_state, 10, raw=light)
         self.node.create_subscription(SimulationStatus, "status", self._on_status, 10)
         for topic, kind in () if light else (("rotors", RotorStateArray), ("inflow", InflowArray)):
@@ -105,11 +105,11 @@ def node_rows(seconds: float, memory_minutes: float) -> list[Row]:
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     watch = Watch()
     with tempfile.TemporaryDirectory() as bags:
-        environment = {**os.environ, "SBS_SIM_BAGS": bags}
         try:
-            return [*_rows(watch, seconds, memory_minutes, environment), *_fast_rows(watch, seconds, environment)]
+            rows = _rows(watch, seconds, memory_minutes, {**os.environ, "SBS_SIM_BAGS": bags})
         finally:
             watch.close()
+    return [*rows, *fast_rows(min(seconds, 10.0))]
 
 
 def fast_rows(seconds: float) -> list[Row]:
@@ -118,10 +118,15 @@ def fast_rows(seconds: float) -> list[Row]:
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     watch = Watch(light=True)
     with tempfile.TemporaryDirectory() as bags:
+        environment = {**os.environ, "SBS_SIM_BAGS": bags}
         try:
-            return _fast_rows(watch, seconds, {**os.environ, "SBS_SIM_BAGS": bags})
+            with flying(watch, environment, publish_rate=FAST) as process:
+                steady = steady_rows(watch, process, seconds)
+            with flying(watch, environment) as process:
+                others = [*discovery_rows(environment), *step_rows(watch, process, seconds)]
         finally:
             watch.close()
+    return [*((name.replace("node", "node at 1 kHz"), *rest) for name, *rest in steady), *others]
 
 
 @contextlib.contextmanager
@@ -141,13 +146,6 @@ def flying(watch: Watch, environment: dict[str, str], **parameters: float) -> It
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(20)
-
-
-def _fast_rows(watch: Watch, seconds: float, environment: dict[str, str]) -> list[Row]:
-    with flying(watch, environment, publish_rate=FAST) as process:
-        rows = [(name.replace("node", "node at 1 kHz"), *rest) for name, *rest in steady_rows(watch, process, seconds)]
-    with flying(watch, environment) as process:
-        return [*rows, *discovery_rows(environment), *step_rows(watch, process, seconds)]
 
 
 def discovery_rows(environment: dict[str, str]) -> list[Row]:

@@ -337,7 +337,8 @@ class Pilots:
         self.check_running()
         assert served(self.port)
         for name, part in self.parts.items():
-            assert "internal error" not in part.output, f"{name}:\n{part.output[-3000:]}"
+            # the web server has "unexpected internal error" for a client that hangs up while its hands are shaken
+            assert "]: internal error" not in part.output, f"{name}:\n{part.output[-3000:]}"
             if name in PILOTS:  # the page's server prints what it could not make of a client's messages
                 assert "Traceback" not in part.output, f"{name}:\n{part.output[-3000:]}"
 

@@ -36,7 +36,7 @@ def test_trims_linear_models_and_flights_have_the_same_bits_in_other_ways():
     assert found.returncode == 0, found.stdout + found.stderr
     lines = found.stdout.splitlines()
     assert lines[-1] == f"the same in {len(WAYS)} ways: {', '.join(WAYS)}"
-    assert [line.split()[1] for line in lines if line.startswith("sbs ")] == ["trim", "A", "rk4"] * len(WAYS)
+    assert [line.split()[1] for line in lines if line.startswith("sbs ")] == ["trim", "A", "etd"] * len(WAYS)
 
 
 def test_azimuths_that_are_told_are_those_that_are_flown(sbs, hover):

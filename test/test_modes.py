@@ -287,6 +287,12 @@ def test_heave_and_yaw_may_oscillate_together():
 # -- names of the rotors' modes --------------------------------------------------------------------------------------
 
 
+def test_poles_of_a_model_that_does_not_oscillate_are_complex_numbers_too():
+    found = modes(np.diag([-1.0, -3.0]), ["u", "w"])
+    assert [mode.pole for mode in found] == [-1.0, -3.0]
+    assert all(isinstance(mode.pole, complex) for mode in found)
+
+
 def test_rotor_modes_have_the_frequencies_of_their_names(sbs, models):
     """At nu - 1, nu, nu + 1 per revolution: flap 1.237, lag 0.490 (theory.md section 3), and damping by the air."""
     omega = sbs.rotors[0].speed

@@ -182,7 +182,7 @@ def _unnamed(a: Array, state_names: Sequence[str]) -> list[Mode]:
     shares /= shares.sum(axis=0)
     largest = right[np.abs(right).argmax(axis=0), np.arange(len(poles))]
     size = max(float(np.abs(poles).max()), 1.0)
-    poles = np.where(np.abs(poles.imag) < 1e-14 * size, poles.real, poles)
+    poles = np.where(np.abs(poles.imag) < 1e-14 * size, poles.real, poles).astype(complex)
     kept = np.flatnonzero(poles.imag >= 0.0)
     vectors, shares = (right / largest).T[kept], shares.T[kept]
     return [Mode("", *found) for found in zip(poles[kept].tolist(), vectors, shares, strict=True)]

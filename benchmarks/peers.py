@@ -27,7 +27,7 @@ INSTALL = (
     "python3 -m venv .cache/peers && .cache/peers/bin/python -m pip install --no-deps"
     " jsbsim==1.3.3 rotorpy==3.0.0 numpy scipy"
 )
-OURS = (("rk4", 5.0), ("tsit5", 14.4))
+OURS = (("rk4", 5.0), ("etd", 14.4))
 ROUNDS, SLICE = 11, 0.3  # [s] of the processor that each one flies in a round
 TICK = 0.01  # s
 # What the other two compute, from their sources: FGRotor.cpp, FGPropagate.h and aircraft/ah1s of JSBSim,

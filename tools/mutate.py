@@ -54,6 +54,7 @@ MODULES: dict[str, tuple[str, ...]] = {
     "model/ground": ("test_working_state.py",),
     "model/trigonometry": ("test_trigonometry.py",),
     "model/integrate": ("test_integrate.py", "-k", "kutta or figure_3 or tsitouras_s or tsitouras_c or ends_before"),
+    "model/exponential": ("test_integrate.py", "-k", "krogstads or coefficients or linear_part"),
     "model/average": ("test_linear.py::test_average_is_the_mean_over_the_azimuths",),
     "model/linear": ("test_linear.py::test_jacobian_is_the_difference_of_the_outputs",),
     "model/fuselage": REFERENCE,

@@ -32,7 +32,7 @@ from sbs_msgs.msg import SimulationStatus
 from sbs_msgs.srv import Reset
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "test"))
+sys.path.insert(0, str(ROOT / "test" / "support"))
 
 import browser  # noqa: E402
 

@@ -1,6 +1,6 @@
 """Times the derivative against a plain numba one of the same equations: `./run python benchmarks/plain_ratio.py`.
 
-The plain one is test/plain_kernel.py. Both are called in turn in one run, so that whatever else the machine does meets
+The plain one is test/support/plain_kernel.py. Both are called in turn in one run, so that whatever else the machine does meets
 both, and the figure is the median of the ratios of neighbours.
 """
 
@@ -19,7 +19,7 @@ from sbs_sim.model.average import averaged_derivative, azimuths
 from sbs_sim.model.records import LOAD_SIZE
 from sbs_sim.simulation import trimmed_state
 
-TEST_FOLDER = Path(__file__).resolve().parent.parent / "test"
+TEST_FOLDER = Path(__file__).resolve().parent.parent / "test" / "support"
 PAIRS, SLICE = 101, 0.004  # [s] of one side of a pair
 Row = tuple[str, float, str, str]
 Call = Callable[[int], Any]
@@ -52,7 +52,7 @@ def plain_rows(aircraft: Aircraft, point: Any, name: str) -> list[Row]:
     times, ratios = timed_in_turn(plain, fast)
     low, median, high = statistics.quantiles(ratios, n=4)
     return [
-        (f"plain derivative, {name}", 1e6 * times, "us", "test/plain_kernel.py, without the loads of the hubs"),
+        (f"plain derivative, {name}", 1e6 * times, "us", "test/support/plain_kernel.py, without the loads of the hubs"),
         (
             f"  over the derivative, {name}",
             median,

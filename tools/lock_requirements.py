@@ -4,7 +4,7 @@
 
 Needs uv (0.13 or later) in the path, and the network. The environment is installed from the .lock files alone, so that
 a package that was exchanged on its way, or later, is refused. The versions are those of the .txt files, which are
-edited by hand; test/test_security.py checks that the two agree.
+edited by hand; test/library/test_security.py checks that the two agree.
 """
 
 import subprocess

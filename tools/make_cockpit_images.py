@@ -1,7 +1,7 @@
 """Makes the pictures of the cockpit in docs/images: `./run python tools/make_cockpit_images.py`.
 
 A flight at 5 m/s, linearized, recorded, and disturbed by a doublet; taken at two sizes. The browser is that of the
-tests, see test/browser.py.
+tests, see test/support/browser.py.
 """
 
 import os
@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "test"))
+sys.path.insert(0, str(ROOT / "test" / "support"))
 
 import browser  # noqa: E402
 

@@ -1,6 +1,6 @@
 """Lanes for functions that numba compiles: types, and the code of every operation as LLVM instructions.
 
-The meaning is that of `sbs_sim.lanes.interpreted`; test/test_lanes.py compares both, operation by operation.
+The meaning is that of `sbs_sim.lanes.interpreted`; test/physics/test_lanes.py compares both, operation by operation.
 
 A value is built from `Typed` pairs of numba's type and LLVM's value, so that what is said of numbers once holds for the
 components of vectors too. Parts of numba that are no public interface are used here and in `memory` alone: templates of

@@ -1,0 +1,126 @@
+"""Layouts of Foxglove, PlotJuggler and RViz: every field that they show is in a real log and in the interfaces."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from sbs_sim.aircraft import config_folder
+from sbs_sim.recording import read
+
+ROOT = Path(__file__).resolve().parents[2]
+LAYOUTS = config_folder() / "layouts"
+MODIFIERS = {"@rad2deg", "@negative"}  # those of Foxglove's message paths that are used
+
+
+@pytest.fixture(scope="module")
+def log():
+    return read(ROOT / "bags" / "hover_step.mcap")
+
+
+def foxglove():
+    return json.loads((LAYOUTS / "foxglove.json").read_text())
+
+
+def foxglove_paths():
+    panels = foxglove()["configById"].values()
+    return [path["value"] for panel in panels for path in panel.get("paths", [])]
+
+
+def plotjuggler_curves():
+    tree = ElementTree.parse(LAYOUTS / "plotjuggler.xml")
+    return [curve.attrib["name"] for curve in tree.iter("curve")]
+
+
+def values_of(log, topic, field):
+    """Values of a field of a log; the last index may be one within an array."""
+    group = log[topic.lstrip("/")]
+    if field in group:
+        return group[field]
+    array, index = re.fullmatch(r"(.*)\[(\d+)\]", field).groups()
+    return group[array][:, int(index)]
+
+
+def check(log, topic, field):
+    values = np.asarray(values_of(log, topic, field), dtype=float)
+    assert len(values) > 0
+    assert np.all(np.isfinite(values))
+
+
+def test_every_path_of_foxglove_is_in_the_log(log):
+    paths = foxglove_paths()
+    assert len(paths) > 40
+    for path in paths:
+        topic, _, rest = path.partition(".")
+        *fields, last = rest.split(".")
+        if last.startswith("@"):
+            assert last in MODIFIERS
+        else:
+            fields.append(last)
+        check(log, topic, ".".join(fields))
+
+
+def test_every_curve_of_plotjuggler_is_in_the_log(log):
+    curves = plotjuggler_curves()
+    assert len(curves) > 40
+    for curve in curves:
+        _, topic, *fields = curve.split("/")
+        check(log, topic, ".".join(fields))
+
+
+def test_topics_of_panels_are_those_of_the_log(log):
+    panels = foxglove()["configById"]
+    topics = {panel[key] for panel in panels.values() for key in ("topicPath", "topicToRender") if key in panel}
+    topics |= {topic for panel in panels.values() for topic in panel.get("topics", {})}
+    assert topics == {"/odom", "/diagnostics", "/status", "/events"}
+    assert topics <= {f"/{topic.lstrip('/')}" for topic in log.topics}
+
+
+def test_every_panel_is_shown_once():
+    layout = foxglove()
+
+    def leaves(node):
+        if isinstance(node, str):
+            return [node]
+        assert node["direction"] in ("row", "column")
+        assert 0.0 < node["splitPercentage"] < 100.0
+        return leaves(node["first"]) + leaves(node["second"])
+
+    shown = leaves(layout["layout"])
+    for name in list(shown):
+        for tab in layout["configById"][name].get("tabs", []):
+            shown += leaves(tab["layout"])
+    assert sorted(shown) == sorted(layout["configById"])
+
+
+def test_splitters_of_plotjuggler_have_as_many_areas_as_they_say():
+    tree = ElementTree.parse(LAYOUTS / "plotjuggler.xml")
+    splitters = list(tree.iter("DockSplitter"))
+    assert splitters
+    for splitter in splitters:
+        assert len(splitter) == int(splitter.attrib["count"]) == len(splitter.attrib["sizes"].split(";"))
+
+
+def test_rviz_shows_topics_of_the_simulator_and_sends_targets(log):
+    config = YAML(typ="safe", pure=True).load((LAYOUTS / "sbs_sim.rviz").read_text())["Visualization Manager"]
+    by_class = {entry["Class"].rpartition("/")[2]: entry for entry in config["Displays"] + config["Tools"]}
+    assert by_class["Odometry"]["Topic"]["Value"] == "/odom"
+    assert by_class["SetGoal"]["Topic"]["Value"] == by_class["Pose"]["Topic"]["Value"] == "/target"
+    assert config["Global Options"]["Fixed Frame"] == log["odom"]["header.frame_id"][0]
+    assert log["odom"].type == "nav_msgs/msg/Odometry"
+
+
+def test_the_layouts_are_those_of_their_script(tmp_path):
+    code = (
+        "import sys, pathlib; sys.path.insert(0, 'tools'); import make_layouts;"
+        f"make_layouts.FOLDER = pathlib.Path({str(tmp_path)!r}); make_layouts.main()"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, timeout=60)
+    for name in ("foxglove.json", "plotjuggler.xml"):
+        assert (tmp_path / name).read_text() == (LAYOUTS / name).read_text()

@@ -1,7 +1,7 @@
 """Times the derivative against a plain numba one of the same equations: `./run python benchmarks/plain_ratio.py`.
 
-The plain one is test/support/plain_kernel.py. Both are called in turn in one run, so that whatever else the machine does meets
-both, and the figure is the median of the ratios of neighbours.
+The plain one is test/support/plain_kernel.py. Both are called in turn in one run, so that whatever else the machine
+does meets both, and the figure is the median of the ratios of neighbours.
 """
 
 import statistics

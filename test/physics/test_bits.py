@@ -21,6 +21,7 @@ from sbs_sim.model.wind import Wind
 from sbs_sim.simulation import trimmed_state
 
 ROOT = Path(__file__).resolve().parents[2]
+TOOL = ROOT / "tools" / "robustness" / "compare_bits.py"
 
 
 WAYS = ("native", "blas-SkylakeX", "numpy-sse", "x86-64-v3")  # the last with other registers and another optimisation
@@ -30,7 +31,7 @@ def test_trims_linear_models_and_flights_have_the_same_bits_in_other_ways():
     """The flight goes through wind, a gust and turbulence."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "OPENBLAS_"))}
     found = subprocess.run(
-        [sys.executable, ROOT / "tools/robustness/compare_bits.py", "--kept", "--aircraft", "sbs", "--most", "3", "--ways", *WAYS],
+        [sys.executable, TOOL, "--kept", "--aircraft", "sbs", "--most", "3", "--ways", *WAYS],
         env=environment, capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     assert found.returncode == 0, found.stdout + found.stderr

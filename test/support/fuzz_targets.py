@@ -1,7 +1,8 @@
 """Fuzz targets: the library's functions, its readers and its commands; for `test_fuzz.py` and `fuzz.py`.
 
-A `FuzzTarget` has a hypothesis strategy for its inputs, most of them malformed or extreme, and a check of what comes of one: the result
-is sound, or an `SbsError` of one line refuses it. Any other exception, a hang, a file outside the folder is a failure.
+A `FuzzTarget` has a hypothesis strategy for its inputs, most of them malformed or extreme, and a check of what comes
+of one: the result is sound, or an `SbsError` of one line refuses it. Any other exception, a hang, a file outside the
+folder is a failure.
 """
 
 import contextlib

@@ -4,10 +4,10 @@
 
 TEST are files of the folder test; without any they are all but those that start ROS nodes, which `--nodes` adds. The
 executables that tests start are measured too, but for those that a test kills; what it leaves running is interrupted.
-Compiled kernels do not show: what numba compiled, Python does not execute. So the quick tests of tools/robustness/mutate.py run
-first with the kernels as plain Python (NUMBA_DISABLE_JIT), and both count together; a kernel that only a flight
-executes is then still named, although it is tested. `--lines` names the lines and the branches, as LINE->LINE, that
-were not executed.
+Compiled kernels do not show: what numba compiled, Python does not execute. So the quick tests of mutate.py run first
+with the kernels as plain Python (NUMBA_DISABLE_JIT), and both count together; a kernel that only a flight executes is
+then still named, although it is tested. `--lines` names the lines and the branches, as LINE->LINE, that were not
+executed.
 
 A table by folder is printed, and kept with everything else in build/coverage. Exit code 1 if a test fails.
 """
@@ -78,7 +78,7 @@ def _files(nodes: bool) -> list[str]:
 
 
 def _plain_tests() -> list[list[str]]:
-    """The tests of the model's modules in tools/robustness/mutate.py: in one run those that are selected by nothing but names."""
+    """The tests of the model's modules in mutate.py: in one run those that are selected by nothing but names."""
     chosen = [tests for name, tests in mutate.MODULES.items() if name.startswith("model/")]
     selected = [[mutate.located(test[0]), *test[1:]] for test in chosen if "-k" in test]
     return [sorted({mutate.located(test) for tests in chosen if "-k" not in tests for test in tests}), *selected]

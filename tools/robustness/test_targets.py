@@ -3,7 +3,7 @@
     ./run python tools/robustness/test_targets.py
     ./run python tools/robustness/test_targets.py --targets haswell generic -- test/recording/test_replay.py
 
-The model's bits are the same for all of them (`tools/robustness/compare_bits.py`), so what fails here hangs on a library, or is a
+The model's bits are the same for all of them (`compare_bits.py`), so what fails here hangs on a library, or is a
 fault of ours. A target is a name that LLVM knows. `NUMBA_CPU_FEATURES` is empty then: the name alone would keep the
 features of this machine, and the suite would pass for the wrong reason. This machine must be able to execute what is
 compiled. The exit code is 1 if a test fails.

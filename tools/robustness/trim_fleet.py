@@ -2,11 +2,11 @@
 
     ./run python tools/robustness/trim_fleet.py [--aircraft 500] [--seed 1] [--starts 20] [--seconds 5] [--workers 2]
 
-Conventional, tandem, side-by-side, quadrotor and coaxial aircraft (test/support/random_aircraft.py), each in hover, forward
-flight and one other. What is found must fulfil the complete equations and fly on for a revolution. What is not found is
-looked for by another way: least squares from random attitudes, controls and inflows all over the ranges. The same
-search after every tenth flight that was found tells how much it sees. The exit code is 1 if it finds a flight without
-stalled rotors that `trim` does not, or if something found is no trim.
+Conventional, tandem, side-by-side, quadrotor and coaxial aircraft (test/support/random_aircraft.py), each in hover,
+forward flight and one other. What is found must fulfil the complete equations and fly on for a revolution. What is not
+found is looked for by another way: least squares from random attitudes, controls and inflows all over the ranges. The
+same search after every tenth flight that was found tells how much it sees. The exit code is 1 if it finds a flight
+without stalled rotors that `trim` does not, or if something found is no trim.
 """
 
 import argparse

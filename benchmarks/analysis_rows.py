@@ -9,13 +9,13 @@ from scipy.optimize import root
 from scipy.optimize._numdiff import approx_derivative
 
 from sbs_sim import Aircraft, linearize, trim
+from sbs_sim.analysis.differences import difference_steps
 from sbs_sim.analysis.floquet import floquet
-from sbs_sim.analysis.linearize import difference_steps
 from sbs_sim.analysis.sweep import sweep
-from sbs_sim.analysis.trim import TrimPoint
 from sbs_sim.analysis.trim_guess import MomentumTheory
-from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
-from sbs_sim.engine import Engine
+from sbs_sim.analysis.trim_problem import TrimProblem
+from sbs_sim.flight.engine import Engine
+from sbs_sim.flight.trim_point import TrimCondition, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
 

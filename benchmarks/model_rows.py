@@ -11,8 +11,8 @@ from plain_ratio import package_calls, plain_rows
 from step_errors import step_rows
 
 from sbs_sim import Aircraft, trim
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import state as S
-from sbs_sim.simulation import trimmed_state
 
 Row = tuple[str, float, str, str]
 Timed = Callable[..., tuple[float, str]]

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sbs_sim import Aircraft, simulate, trim
+from sbs_sim.flight.simulation import METHODS, Simulation
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.integrate import STAGES
-from sbs_sim.simulation import METHODS, Simulation, trimmed_state
 
 ROOT = Path(__file__).resolve().parent.parent
 PEERS_PYTHON = ROOT / ".cache" / "peers" / "bin" / "python"

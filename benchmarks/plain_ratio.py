@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from sbs_sim import Aircraft, trim
-from sbs_sim.engine import Engine
+from sbs_sim.flight.engine import Engine
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.average import averaged_derivative, azimuths
 from sbs_sim.model.records import LOAD_SIZE
-from sbs_sim.simulation import trimmed_state
 
 TEST_FOLDER = Path(__file__).resolve().parent.parent / "test" / "support"
 PAIRS, SLICE = 101, 0.004  # [s] of one side of a pair

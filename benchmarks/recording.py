@@ -16,9 +16,10 @@ from rosgraph_msgs.msg import Clock
 
 from sbs_msgs.msg import SimulationStatus
 from sbs_sim import Aircraft, trim
+from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.nodes.conversions import StateMessages, to_time
 from sbs_sim.recording import LogWriter, message_definition, qos_profiles, read, recover
-from sbs_sim.simulation import Simulation, trimmed_state
 
 TYPES = {
     "/state": "sbs_msgs/msg/BodyState",

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sbs_sim import Aircraft, simulate, trim
-from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.wind import Wind
 

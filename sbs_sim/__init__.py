@@ -13,25 +13,28 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
-    from sbs_sim.analysis.linearize import LinearModel, linearize
+    from sbs_sim.analysis.batch import Batch, Case, simulate_batch
+    from sbs_sim.analysis.linear_model import LinearModel
+    from sbs_sim.analysis.linearize import linearize
     from sbs_sim.analysis.sweep import Sweep, sweep
-    from sbs_sim.analysis.trim import TrimPoint, trim
-    from sbs_sim.batch import Batch, Case, simulate_batch
-    from sbs_sim.simulation import Simulation, simulate
+    from sbs_sim.analysis.trim import trim
+    from sbs_sim.flight.simulate import simulate
+    from sbs_sim.flight.simulation import Simulation
+    from sbs_sim.flight.trim_point import TrimPoint
 
 _HOME = {
     "Aircraft": "sbs_sim.aircraft",
-    "Batch": "sbs_sim.batch",
-    "Case": "sbs_sim.batch",
-    "simulate_batch": "sbs_sim.batch",
-    "LinearModel": "sbs_sim.analysis.linearize",
+    "Batch": "sbs_sim.analysis.batch",
+    "Case": "sbs_sim.analysis.batch",
+    "simulate_batch": "sbs_sim.analysis.batch",
+    "LinearModel": "sbs_sim.analysis.linear_model",
     "linearize": "sbs_sim.analysis.linearize",
     "Sweep": "sbs_sim.analysis.sweep",
     "sweep": "sbs_sim.analysis.sweep",
-    "TrimPoint": "sbs_sim.analysis.trim",
+    "TrimPoint": "sbs_sim.flight.trim_point",
     "trim": "sbs_sim.analysis.trim",
-    "Simulation": "sbs_sim.simulation",
-    "simulate": "sbs_sim.simulation",
+    "Simulation": "sbs_sim.flight.simulation",
+    "simulate": "sbs_sim.flight.simulate",
 }
 __all__ = [
     "Aircraft",

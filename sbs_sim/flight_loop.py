@@ -25,8 +25,9 @@ from numpy.typing import ArrayLike
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError, SimulationError
+from sbs_sim.flight.records import Event, Snapshot
+from sbs_sim.flight.simulation import Simulation
 from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import Event, Simulation, Snapshot
 
 QUEUE_LENGTH = 100  # snapshots between the flight and their reader: one second at 100 Hz
 FAST_LENGTH = 2  # the same where the flight waits for its reader: how far a controller is behind

@@ -5,13 +5,15 @@ import shutil
 from numba import config
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.batch import Case, simulate_batch
 from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.trim import trim
-from sbs_sim.batch import Case, simulate_batch
+from sbs_sim.flight.simulate import simulate
+from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.kernel_cache import cache_folder
 from sbs_sim.model.packing import lane_count
 from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import Simulation, simulate, trimmed_state
 
 
 def main() -> None:

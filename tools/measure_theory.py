@@ -20,9 +20,10 @@ from sbs_sim import Aircraft, linearize, simulate, trim
 from sbs_sim.analysis.floquet import floquet
 from sbs_sim.analysis.reproduce import undamped_sbs
 from sbs_sim.analysis.trim_guess import MomentumTheory
-from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
+from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.two_loop import _TwoLoops
 from sbs_sim.errors import TrimError
+from sbs_sim.flight.trim_point import TrimCondition
 
 FORWARD, FASTEST, STEP = 15.0, 30.0, 0.5  # m/s
 ONLY_FLAP = {"lead_lag": False, "cyclic_inflow": False}

@@ -15,10 +15,10 @@ from scipy.linalg import matrix_balance
 from scipy.optimize import linear_sum_assignment
 
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.linearize import difference_steps, jacobians, used_states
-from sbs_sim.analysis.trim import TrimPoint
+from sbs_sim.analysis.differences import difference_steps, jacobians, used_states
 from sbs_sim.content import ByContent
 from sbs_sim.errors import LinearizationError
+from sbs_sim.flight.trim_point import TrimPoint
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

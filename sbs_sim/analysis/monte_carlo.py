@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft_values import unit_of
-from sbs_sim.analysis.trim_problem import LIMITS
-from sbs_sim.batch import Batch, Case, percentiles
+from sbs_sim.analysis.batch import Batch, Case, percentiles
 from sbs_sim.errors import BatchError
+from sbs_sim.flight.trim_point import LIMITS
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.model.noise import normal

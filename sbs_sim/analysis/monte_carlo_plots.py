@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from sbs_sim.analysis.batch import Batch, percentiles
 from sbs_sim.analysis.monte_carlo import SHARES, quantities
-from sbs_sim.batch import Batch, percentiles
-from sbs_sim.plot_style import COLOURS
+from sbs_sim.output.plot_style import COLOURS
 
 SHOWN = ("height [m]", "u [m/s]", "v [m/s]", "roll [deg]", "pitch [deg]", "power [W]")
 SINGLE = 12  # flights that are drawn one by one

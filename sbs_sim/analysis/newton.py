@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim import interruption
+from sbs_sim.concurrency import interruption
 from sbs_sim.content import ByContent
 from sbs_sim.model.solve import length, smallest, solve
 

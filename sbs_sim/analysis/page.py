@@ -6,11 +6,11 @@ from html import escape
 from pathlib import Path
 
 from sbs_sim.analysis import reproduce_format as f
-from sbs_sim.analysis.export import write
 from sbs_sim.analysis.paper_tables import contents
 from sbs_sim.analysis.plots import Drawing, drawings
 from sbs_sim.analysis.reproduce import Comparison, Entry, Report
 from sbs_sim.errors import ExportError
+from sbs_sim.output.files import write
 
 TITLE = "Recomputed results of the side-by-side helicopter"
 PAGE = "index.html"

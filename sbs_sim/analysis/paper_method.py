@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft, Rotor
 from sbs_sim.aircraft_model import second_moment
-from sbs_sim.analysis.linearize import kinematics, settle, used_states
-from sbs_sim.analysis.trim import TrimPoint
-from sbs_sim.engine import Engine
+from sbs_sim.analysis.differences import used_states
+from sbs_sim.analysis.kinematics import kinematics
+from sbs_sim.analysis.linear_model import settle
+from sbs_sim.flight.engine import Engine
+from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
 from sbs_sim.model.frames import hub_axes, rotation_matrix

@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.export import plain
-from sbs_sim.analysis.linearize import LinearModel, linearize, settle
+from sbs_sim.analysis.linear_model import LinearModel, settle
+from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.modes import Mode, first_matrix_modes, modes
 from sbs_sim.analysis.paper_tables import TABLES, Cell, Row, Table, Value, contents, printed_tables
 from sbs_sim.analysis.reproduce_remarks import UNEXPLAINED, general_remarks, remark_on
 from sbs_sim.analysis.sweep import Sweep, sweep
 from sbs_sim.model.state import CONTROL_NAMES, INFLOW_NAMES, LINEAR_BODY_NAMES, part_of
+from sbs_sim.output.json_text import plain
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]

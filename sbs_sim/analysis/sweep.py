@@ -18,13 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft_values import unit_of
-from sbs_sim.analysis.export import model_to_dict, trim_to_dict
-from sbs_sim.analysis.linearize import LinearModel, linearize
+from sbs_sim.analysis.export import model_to_dict
+from sbs_sim.analysis.linear_model import LinearModel
+from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.modes import Mode
-from sbs_sim.analysis.trim import Guess, TrimPoint, checked_guess, trim
+from sbs_sim.analysis.trim import Guess, checked_guess, trim
+from sbs_sim.concurrency.parallel import checked_workers, compute
 from sbs_sim.errors import AircraftError, SbsError, SweepError
+from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.model import state as S
-from sbs_sim.parallel import checked_workers, compute
 
 if TYPE_CHECKING:
     import distributed
@@ -188,7 +190,7 @@ class Sweep:
                 "value": point.value,
                 "error": point.error,
                 "warnings": list(point.warnings),
-                "trim": trim_to_dict(point.trim) if point.trim else None,
+                "trim": point.trim.to_dict() if point.trim else None,
                 "model": model_to_dict(point.model, with_trim=False) if point.model else None,
             }
             for point in self.points
@@ -196,7 +198,7 @@ class Sweep:
         return {"parameter": self.parameter, "points": points}
 
     def _repr_html_(self) -> str:
-        from sbs_sim.notebook import sweep_html
+        from sbs_sim.output.notebook import sweep_html
 
         return sweep_html(self)
 

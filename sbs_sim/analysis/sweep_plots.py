@@ -17,13 +17,13 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sbs_sim.analysis.export import write
 from sbs_sim.analysis.modes import Mode
 from sbs_sim.analysis.sweep import CONDITIONS, Sweep
 from sbs_sim.errors import ExportError
 from sbs_sim.model.state import CONTROL_NAMES, part_of
-from sbs_sim.plot_labels import PLAIN, name_poles
-from sbs_sim.plot_style import COLOURS, DASHES
+from sbs_sim.output.files import write
+from sbs_sim.output.plot_labels import PLAIN, name_poles
+from sbs_sim.output.plot_style import COLOURS, DASHES
 
 Array = NDArray[np.float64]
 

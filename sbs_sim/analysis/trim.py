@@ -13,10 +13,11 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.newton import LARGEST_UNKNOWN
 from sbs_sim.analysis.trim_guess import MomentumTheory
-from sbs_sim.analysis.trim_problem import TrimCondition, TrimPoint, TrimProblem
+from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.trim_search import find
 from sbs_sim.analysis.two_loop import solve_by_two_loops
 from sbs_sim.errors import TrimError
+from sbs_sim.flight.trim_point import TrimCondition, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.state import StateLayout
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft, Rotor
 from sbs_sim.aircraft_model import LEAST_DENSITY, second_moment
-from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
+from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.content import ByContent
+from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.airfoil import AirfoilTable

@@ -1,4 +1,4 @@
-"""The equations of trim, and what a trimmed flight is (theory.md section 8).
+"""The equations of trim (theory.md section 8).
 
 Unknowns are pitch and roll, the four controls, and of every rotor flap, lag and inflow; equations are the averages of
 the six body accelerations, of the flap and lag accelerations and of the inflow rates.
@@ -6,43 +6,28 @@ the six body accelerations, of the flap and lag accelerations and of the inflow 
 
 import copy
 import math
-from collections.abc import Iterator
-from dataclasses import astuple, dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.export import trim_to_dict
-from sbs_sim.content import ByContent
-from sbs_sim.engine import Engine, points_engine
-from sbs_sim.errors import TrimError
+from sbs_sim.flight.engine import Engine, points_engine
+from sbs_sim.flight.trim_point import TrimCondition, TrimPoint
+from sbs_sim.flight.validity import warnings
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
 from sbs_sim.model.balance import trim_residuals, trim_sides
 from sbs_sim.model.dynamics import derivative
-from sbs_sim.model.elementary import cosine_and_sine
-from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
+from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
-from sbs_sim.validity import warnings
 
 Array = NDArray[np.float64]
 
 ATTITUDE_UNKNOWNS, CONTROL_UNKNOWNS = 2, 4
 BODY_UNKNOWNS = ATTITUDE_UNKNOWNS + CONTROL_UNKNOWNS
-# Largest magnitude of each value of a condition, and its unit.
-LIMITS = {
-    "airspeed": (100.0, "m/s"),
-    "climb_rate": (50.0, "m/s"),
-    "sideslip": (math.pi, "rad"),
-    "turn_rate": (3.0, "rad/s"),
-}
 BODY_STEP, ROTOR_STEP = 1e-5, 1e-6  # of the differences: m/s, rad/s, rad; rad, inflow ratio
 JACOBIAN_AZIMUTHS = 4  # enough to say where to go, the residual says where to stop
-ROTOR_LOADS = ("thrust", "torque", "power")
 BODY_BALANCES = (
     "force ahead",
     "force to the right",
@@ -51,178 +36,6 @@ BODY_BALANCES = (
     "pitching moment",
     "yawing moment",
 )
-
-
-@dataclass(frozen=True)
-class TrimCondition:
-    """The flight to be trimmed, relative to the air.
-
-    Parameters
-    ----------
-    airspeed : float
-        Horizontal component of the velocity [m/s]; negative is backwards.
-    climb_rate : float
-        Vertical component, positive up [m/s].
-    sideslip : float
-        Angle from the heading to the horizontal track, positive to the right [rad]: pi/2 is sideways to the right.
-    turn_rate : float
-        Rate of the heading, positive to the right [rad/s].
-
-    Raises
-    ------
-    TrimError
-        For a value that is not finite or out of range.
-    """
-
-    airspeed: float = 0.0
-    climb_rate: float = 0.0
-    sideslip: float = 0.0
-    turn_rate: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        for name, (most, unit) in LIMITS.items():
-            value = checks.number(name, getattr(self, name), -most, most, unit, TrimError)
-            object.__setattr__(self, name, value)
-
-    def scaled(self, share: float) -> "TrimCondition":
-        """Condition on the way from hover (0) to this one (1) and on, as far as there are any."""
-        parts = {
-            name: min(LIMITS[name][0], max(-LIMITS[name][0], share * getattr(self, name)))
-            for name in ("airspeed", "climb_rate", "turn_rate")
-        }
-        return replace(self, **parts)
-
-    def toward(self, other: "TrimCondition", share: float) -> "TrimCondition":
-        """Condition on the way from this one (0) to another (1)."""
-        pairs = zip(astuple(self), astuple(other), strict=True)
-        return TrimCondition(*(start + share * (end - start) for start, end in pairs))
-
-    @property
-    def is_motion(self) -> bool:
-        """False in hover."""
-        return bool(self.airspeed or self.climb_rate or self.turn_rate)
-
-    def motion(self, pitch: float, roll: float) -> tuple[Array, Array]:
-        """Velocity [m/s] and angular velocity [rad/s] in body axes at an attitude [rad], each shape (3,)."""
-        forward, right, down, turn = self.along_heading().tolist()
-        rows = rotation_matrix(euler_to_quaternion(0.0, pitch, roll))
-        return rows[0] * forward + rows[1] * right + rows[2] * down, rows[2] * turn
-
-    def along_heading(self) -> Array:
-        """Velocity forward, right and down in axes of the heading [m/s], and its rate [rad/s], shape (4,)."""
-        along, across = cosine_and_sine(self.sideslip)
-        return np.array([self.airspeed * along, self.airspeed * across, -self.climb_rate, self.turn_rate])
-
-
-@dataclass(frozen=True, eq=False)
-class TrimPoint(ByContent):
-    """A trimmed flight.
-
-    Attributes
-    ----------
-    condition : TrimCondition
-    lead_lag, cyclic_inflow : bool
-        Fidelity.
-    azimuth_count : int
-        N_c of the averages.
-    controls : ndarray, shape (4,)
-        Collective, lateral, longitudinal, differential longitudinal cyclic [rad].
-    swashplate : ndarray, shape (n_rotors, 3)
-        Angles of each rotor [rad].
-    pitch, roll : float
-        [rad]
-    state : ndarray, shape (n,)
-        Linear state, 38 for two three-bladed rotors; names in `state_names`.
-    state_names : tuple of str
-    thrust, torque, power : ndarray, shape (n_rotors,)
-        Mean aerodynamic thrust along the shaft [N], shaft torque [N m], shaft power [W].
-    residual : float
-        Largest scaled residual of the complete equations, whatever the method: accelerations over gravity, rotor and
-        inflow rates over those of one revolution.
-    method : str
-        "newton" or "two_loop".
-    iterations : int
-        Newton iterations in all, or iterations of the outer loop.
-    inner_iterations : int
-        Iterations of the inner loop in all; 0 with Newton's method.
-    beyond_limits : tuple of str
-        Controls and swashplate angles that the trim needs beyond their range; empty if it can be flown.
-    warnings : tuple of str
-        Where the model does not hold, a line each: vortex ring, stall, Mach and Reynolds numbers ...; empty if it does.
-    parameter_hash : str
-        Of the aircraft, see `Aircraft.parameter_hash`.
-    """
-
-    condition: TrimCondition
-    lead_lag: bool
-    cyclic_inflow: bool
-    azimuth_count: int
-    controls: Array
-    swashplate: Array
-    pitch: float
-    roll: float
-    state: Array
-    state_names: tuple[str, ...]
-    thrust: Array
-    torque: Array
-    power: Array
-    residual: float
-    method: str
-    iterations: int
-    inner_iterations: int
-    beyond_limits: tuple[str, ...]
-    warnings: tuple[str, ...]
-    parameter_hash: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything as plain lists and numbers for JSON, by the names of the attributes, with "control_names"."""
-        return trim_to_dict(self)
-
-    def keys(self) -> tuple[str, ...]:
-        """What `point[name]` knows."""
-        return (*S.CONTROL_NAMES, *ROTOR_LOADS, "psi", S.AIRSPEED, *self.state_names)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.keys())
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.keys()
-
-    def __getitem__(self, name: str) -> Any:
-        """Value of a name.
-
-        Parameters
-        ----------
-        name : str
-            A state, "theta" and "phi" among them; a control [rad]; "psi", the heading, which is 0 [rad]; "V", the speed
-            relative to the air [m/s]; "thrust" [N], "torque" [N m], "power" [W].
-
-        Returns
-        -------
-        float, of thrust, torque and power ndarray of shape (n_rotors,)
-
-        Raises
-        ------
-        KeyError
-            There is none; the message lists those that there are.
-        """
-        if name in self.state_names:
-            return float(self.state[self.state_names.index(name)])
-        if name in S.CONTROL_NAMES:
-            return float(self.controls[S.CONTROL_NAMES.index(name)])
-        if name in ROTOR_LOADS:
-            return getattr(self, name)
-        if name == S.AIRSPEED:
-            return math.hypot(self.condition.airspeed, self.condition.climb_rate)
-        if name == "psi":
-            return 0.0
-        raise KeyError(f"no {name!r}: there are {', '.join(self)}")
-
-    def _repr_html_(self) -> str:
-        from sbs_sim.notebook import trim_html
-
-        return trim_html(self)
 
 
 class TrimProblem:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from sbs_sim.aircraft_model import LEAST_DENSITY
 from sbs_sim.analysis.newton import newton
 from sbs_sim.analysis.trim_guess import MomentumTheory
-from sbs_sim.analysis.trim_problem import ATTITUDE_UNKNOWNS, BODY_UNKNOWNS, TrimCondition, TrimProblem
+from sbs_sim.analysis.trim_problem import ATTITUDE_UNKNOWNS, BODY_UNKNOWNS, TrimProblem
 from sbs_sim.errors import TrimError
+from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model import state as S
 
 Array = NDArray[np.float64]

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from sbs_sim.analysis.newton import Equations, newton
 from sbs_sim.analysis.trim_guess import DIGITS
-from sbs_sim.analysis.trim_problem import BODY_UNKNOWNS, TrimCondition, TrimProblem
+from sbs_sim.analysis.trim_problem import BODY_UNKNOWNS, TrimProblem
 from sbs_sim.errors import TrimError
+from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model.average import azimuths
 from sbs_sim.model.solve import solve
 from sbs_sim.model.steady import steady_balance

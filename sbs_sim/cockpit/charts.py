@@ -12,11 +12,11 @@ from viser import ViserServer, uplot
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.cockpit.told import line
+from sbs_sim.flight.records import Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
-from sbs_sim.plot_style import COLOURS
-from sbs_sim.simulation import Snapshot
+from sbs_sim.output.plot_style import COLOURS
 
 Array = NDArray[np.float64]
 

@@ -12,12 +12,12 @@ from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
-from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.cockpit.readouts import condition_here
 from sbs_sim.cockpit.told import Trimmed, line, model_page, trim_page
 from sbs_sim.errors import SbsError
+from sbs_sim.flight.records import Snapshot
+from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model.state import CONTROL_NAMES
-from sbs_sim.simulation import Snapshot
 
 Array = NDArray[np.float64]
 Answer = tuple[bool, str]  # whether it was done, and what is to be said

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.errors import RecordingError
+from sbs_sim.flight.records import Event, Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.recording import Log, read
 from sbs_sim.recording.flight import flight_of
-from sbs_sim.simulation import Event, Snapshot
 
 Array = NDArray[np.float64]
 

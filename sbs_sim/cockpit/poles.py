@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sbs_sim.plot_labels import name_poles
+from sbs_sim.output.plot_labels import name_poles
 
 STABLE, UNSTABLE = "#0072B2", "#D55E00"
 TEXT_SIZE = 7.0  # points

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.trim import TrimCondition
+from sbs_sim.flight.records import Snapshot
+from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
-from sbs_sim.simulation import Snapshot
 
 SKY, EARTH, MARK = "#8fbbe0", "#b59a78", "#20262c"
 PIXELS_PER_DEGREE = 2.0

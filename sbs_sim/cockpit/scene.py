@@ -18,11 +18,11 @@ from viser.transforms import SO3
 
 from sbs_sim.aircraft import Aircraft, Rotor
 from sbs_sim.cockpit import geometry
+from sbs_sim.flight.records import Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import hub_axes
 from sbs_sim.model.multiblade import blade_matrix
-from sbs_sim.simulation import Snapshot
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.content import ByContent
+from sbs_sim.flight.records import Snapshot
+from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
-from sbs_sim.simulation import Snapshot
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from sbs_sim.cockpit.readouts import Status, readout, source_line
 from sbs_sim.cockpit.scene import COLOURS, MOMENT, PATH, THRUST, Scene, Shown
 from sbs_sim.cockpit.viewpoint import ViewPanel, Viewpoint
 from sbs_sim.errors import SbsError
-from sbs_sim.simulation import Snapshot
+from sbs_sim.flight.records import Snapshot
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,6 @@ import argparse
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from sbs_sim.command_line import Parser, assignment
 from sbs_sim.commands.common import (
     OUTSIDE,
     add_flight_arguments,
@@ -16,10 +15,11 @@ from sbs_sim.commands.common import (
     print_table,
 )
 from sbs_sim.errors import BatchError
-from sbs_sim.progress import progress_bar
+from sbs_sim.terminal.command_line import Parser, assignment
+from sbs_sim.terminal.progress import progress_bar
 
 if TYPE_CHECKING:
-    from sbs_sim.batch import Batch
+    from sbs_sim.analysis.batch import Batch
 
 LISTED = 10  # flights that ended early, with their reasons
 
@@ -65,9 +65,10 @@ def make_parser() -> Parser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.analysis.export import check_target, to_json, write
+    from sbs_sim.analysis.batch import simulate_batch
     from sbs_sim.analysis.monte_carlo import OUTPUTS, batch_to_csv, batch_to_dict, gust_cases
-    from sbs_sim.batch import simulate_batch
+    from sbs_sim.output.files import check_target, write
+    from sbs_sim.output.json_text import to_json
 
     check_target(arguments.csv)
     check_target(arguments.json)
@@ -112,8 +113,8 @@ def _work(arguments: argparse.Namespace) -> None:
 
 def _print_batch(batch: "Batch") -> None:
     """Percentiles at the start and at the end, and the flights that ended before."""
+    from sbs_sim.analysis.batch import percentiles
     from sbs_sim.analysis.monte_carlo import SHARES, quantities
-    from sbs_sim.batch import percentiles
 
     whole = len(batch.cases) - len(batch.failed)
     print(f"{len(batch.cases)} flights of {batch.cases[0].aircraft.name}, {whole} of them over {batch.time[-1]:g} s")

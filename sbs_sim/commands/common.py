@@ -13,12 +13,12 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from sbs_sim.command_line import Parser, assignment
 from sbs_sim.errors import SbsError
+from sbs_sim.terminal.command_line import Parser, assignment
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
-    from sbs_sim.analysis.trim import TrimPoint
+    from sbs_sim.flight.trim_point import TrimPoint
 
 DEGREES = 180.0 / math.pi
 INTERRUPTED = 130
@@ -195,8 +195,8 @@ def radians(name: str, degrees: float) -> float:
         It is out of range.
     """
     from sbs_sim import checks
-    from sbs_sim.analysis.trim_problem import LIMITS
     from sbs_sim.errors import TrimError
+    from sbs_sim.flight.trim_point import LIMITS
 
     most, unit = LIMITS[name]
     limit = math.degrees(most)

@@ -4,7 +4,6 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
-from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import (
     DEGREES,
     OUTSIDE,
@@ -15,10 +14,11 @@ from sbs_sim.commands.common import (
     fixed,
     print_table,
 )
+from sbs_sim.terminal.command_line import Parser
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
-    from sbs_sim.analysis.linearize import LinearModel
+    from sbs_sim.analysis.linear_model import LinearModel
     from sbs_sim.model.wind import Wind
     from sbs_sim.pilot.hover_hold import HoverHoldDesign
 
@@ -81,8 +81,9 @@ def _limit(text: str) -> tuple[str, float]:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.analysis import export
     from sbs_sim.analysis.linearize import linearize
+    from sbs_sim.output.files import check_target, write
+    from sbs_sim.output.json_text import to_json
     from sbs_sim.pilot.flight import MOST_DELAY
     from sbs_sim.pilot.hover_hold import HoverModel, design
 
@@ -90,7 +91,7 @@ def _work(arguments: argparse.Namespace) -> None:
         raise UsageError(f"--delay {arguments.delay}: allowed are 0 to {MOST_DELAY} ticks")
     if not 1.0 <= arguments.duration <= LONGEST:
         raise UsageError(f"--duration {arguments.duration:g}: allowed are 1 to {LONGEST:g} s")
-    export.check_target(arguments.json)
+    check_target(arguments.json)
     airs = _airs(arguments)
     craft = aircraft(arguments)
     model = linearize(craft)
@@ -107,7 +108,7 @@ def _work(arguments: argparse.Namespace) -> None:
             print(f"{name}: {line if line.startswith('clipped') else f'{OUTSIDE}: {line}'}")
     if arguments.json:
         told = {name: {**figures, "warnings": warnings[name]} for name, figures in results.items()}
-        export.write(arguments.json, export.to_json(told))
+        write(arguments.json, to_json(told))
 
 
 def _airs(arguments: argparse.Namespace) -> dict[str, tuple["Wind", float, float]]:

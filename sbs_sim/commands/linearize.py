@@ -4,7 +4,6 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import (
     add_flight_arguments,
     add_guess_argument,
@@ -17,6 +16,7 @@ from sbs_sim.commands.common import (
     print_limits,
     print_table,
 )
+from sbs_sim.terminal.command_line import Parser
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from sbs_sim.aircraft import Aircraft
     from sbs_sim.analysis.floquet import Floquet
-    from sbs_sim.analysis.linearize import LinearModel
+    from sbs_sim.analysis.linear_model import LinearModel
     from sbs_sim.analysis.modes import Mode
 
 LEADING = 3  # states named beside a mode
@@ -74,8 +74,11 @@ def make_parser() -> Parser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.analysis.export import ENCODERS, check_target, to_json, write
-    from sbs_sim.analysis.linearize import growing_rotor_modes_text, linearize
+    from sbs_sim.analysis.export import ENCODERS
+    from sbs_sim.analysis.linear_model import growing_rotor_modes_text
+    from sbs_sim.analysis.linearize import linearize
+    from sbs_sim.output.files import check_target, write
+    from sbs_sim.output.json_text import to_json
 
     check_target(arguments.out, ENCODERS)
     check_target(arguments.json)
@@ -180,7 +183,7 @@ def _print_floquet(model: "LinearModel", found: "Floquet") -> None:
 
 def _print_derivatives(model: "LinearModel") -> None:
     """One row for each force and moment; over mass and inertia, so accelerations."""
-    from sbs_sim.analysis.linearize import FORCES, MOMENTS, MOTIONS
+    from sbs_sim.analysis.linear_model import FORCES, MOMENTS, MOTIONS
 
     values = model.derivatives()
     symbols = (*FORCES.values(), *MOMENTS.values())

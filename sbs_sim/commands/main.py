@@ -4,7 +4,7 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-from sbs_sim import command_line
+from sbs_sim.terminal import command_line
 
 # Names, what is called, and what it is for; setup.py has the same for `ros2 run`.
 EXECUTABLES = {

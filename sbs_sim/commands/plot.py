@@ -4,8 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import execute
+from sbs_sim.terminal.command_line import Parser
 
 
 def main() -> None:
@@ -35,7 +35,7 @@ def make_parser() -> Parser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.analysis.export import check_target
+    from sbs_sim.output.files import check_target
     from sbs_sim.recording import read
     from sbs_sim.recording.plot import SUFFIXES, plot
 

@@ -4,9 +4,9 @@ import argparse
 import textwrap
 from typing import TYPE_CHECKING
 
-from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import execute, print_table
-from sbs_sim.progress import progress_bar
+from sbs_sim.terminal.command_line import Parser
+from sbs_sim.terminal.progress import progress_bar
 
 if TYPE_CHECKING:
     from sbs_sim.analysis.reproduce import Comparison, Report
@@ -43,8 +43,9 @@ def make_parser() -> Parser:
 
 def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.aircraft import Aircraft
-    from sbs_sim.analysis.export import check_target, to_json, write
     from sbs_sim.analysis.reproduce import reproduce, undamped_sbs
+    from sbs_sim.output.files import check_target, write
+    from sbs_sim.output.json_text import to_json
 
     check_target(arguments.json)
     craft = Aircraft.load(arguments.aircraft) if arguments.aircraft else undamped_sbs()

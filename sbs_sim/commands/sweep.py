@@ -4,7 +4,6 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from sbs_sim.command_line import Parser, suggestion
 from sbs_sim.commands.common import (
     DEGREES,
     OUTSIDE,
@@ -21,7 +20,8 @@ from sbs_sim.commands.common import (
     radians,
 )
 from sbs_sim.errors import AircraftError, SbsError, SweepError
-from sbs_sim.progress import progress_bar
+from sbs_sim.terminal.command_line import Parser, suggestion
+from sbs_sim.terminal.progress import progress_bar
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
@@ -79,8 +79,10 @@ def _work(arguments: argparse.Namespace) -> None:
     values = _values(arguments)
     if typed.endswith("_deg") and typed in TYPED:
         values = [math.radians(value) for value in values]
-    from sbs_sim.analysis.export import check_target, sweep_to_csv, to_json, write
+    from sbs_sim.analysis.export import sweep_to_csv
     from sbs_sim.analysis.sweep import sweep
+    from sbs_sim.output.files import check_target, write
+    from sbs_sim.output.json_text import to_json
 
     check_target(arguments.csv)
     check_target(arguments.json)

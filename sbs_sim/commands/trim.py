@@ -3,7 +3,6 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from sbs_sim.command_line import Parser
 from sbs_sim.commands.common import (
     DEGREES,
     add_flight_arguments,
@@ -17,13 +16,14 @@ from sbs_sim.commands.common import (
     print_limits,
     print_table,
 )
+from sbs_sim.terminal.command_line import Parser
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sbs_sim.aircraft import Aircraft
     from sbs_sim.analysis.control_effects import ControlEffect
-    from sbs_sim.analysis.trim import TrimPoint
+    from sbs_sim.flight.trim_point import TrimPoint
 
 
 def main() -> int:
@@ -51,9 +51,10 @@ def make_parser() -> Parser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.analysis.export import check_target, to_json, write
     from sbs_sim.analysis.linearize import linearize
     from sbs_sim.analysis.trim import trim
+    from sbs_sim.output.files import check_target, write
+    from sbs_sim.output.json_text import to_json
 
     check_target(arguments.json)
     craft = aircraft(arguments)

@@ -22,7 +22,7 @@ from numba.experimental import function_type as _function_type  # noqa: F401  (t
 from numba.extending import typeof_impl
 from numba.types import WrapperAddressProtocol
 
-from sbs_sim.interruption import raised_outside
+from sbs_sim.concurrency.interruption import raised_outside
 from sbs_sim.model.kernel_cache import cache_folder
 
 # Without numba's reference counting (`_nrt`) a kernel that allocates does not compile, and every look at a row of an

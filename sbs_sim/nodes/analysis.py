@@ -18,7 +18,8 @@ from sbs_msgs.action import Sweep
 from sbs_msgs.msg import LinearModel, TrimPoint
 from sbs_msgs.srv import Linearize, Trim
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.linearize import growing_rotor_modes_text, linearize
+from sbs_sim.analysis.linear_model import growing_rotor_modes_text
+from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.sweep import SweepPoint, sweep
 from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError

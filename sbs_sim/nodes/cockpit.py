@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING
 
 import rclpy.utilities
 
-from sbs_sim.command_line import Parser
 from sbs_sim.errors import SbsError
 from sbs_sim.nodes.confinement import alone_in_domain
 from sbs_sim.nodes.host import DISCOVERY, Component, run
+from sbs_sim.terminal.command_line import Parser
 
 if TYPE_CHECKING:
     from sbs_sim.nodes.cockpit_node import Cockpit

@@ -16,8 +16,8 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from sbs_msgs.msg import Controls, FlightEvent, SwashplateArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError
+from sbs_sim.flight.mixer import Mixer
 from sbs_sim.flight_loop import FlightLoop
-from sbs_sim.mixer import Mixer
 from sbs_sim.model.state import SWASHPLATE_NAMES
 from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, swashplate_messages, to_seconds, to_time

@@ -36,11 +36,13 @@ from sbs_msgs.msg import (
 )
 from sbs_msgs.msg import Wind as WindMessage
 from sbs_msgs.srv import SetWind
-from sbs_sim import validity
 from sbs_sim.aircraft import Aircraft, Rotor
 from sbs_sim.analysis import linearize, modes, sweep, trim
-from sbs_sim.engine import Engine
 from sbs_sim.errors import SimulationError
+from sbs_sim.flight import validity
+from sbs_sim.flight.engine import Engine
+from sbs_sim.flight.records import Event, Snapshot
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
@@ -48,7 +50,6 @@ from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.state import harmonic_count
 from sbs_sim.model.wind import LARGEST_WIND, Wind
-from sbs_sim.simulation import Event, Snapshot, trimmed_state
 
 Array = NDArray[np.float64]
 
@@ -184,7 +185,7 @@ def fill_working_states(status: SimulationStatus, aircraft: Aircraft, snapshot: 
 
 
 class BladeAngles:
-    """Flap and lag angles of all blades, as `sbs_sim.simulation.blade_angles` gives them; in memory of its own.
+    """Flap and lag angles of all blades, as `sbs_sim.flight.blade_angles` gives them; in memory of its own.
 
     Parameters
     ----------

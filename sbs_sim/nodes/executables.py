@@ -9,8 +9,8 @@ import signal
 import sys
 from collections.abc import Callable
 
-from sbs_sim import command_line
 from sbs_sim.nodes.output import wait_for_no_reader
+from sbs_sim.terminal import command_line
 
 INTERRUPTED = 128 + signal.SIGINT  # exit code of what was not meant to run until Ctrl-C
 OWN_COMMAND_LINE = ("replay", "cockpit")

@@ -23,11 +23,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 
-from sbs_sim.command_line import suggestion
 from sbs_sim.errors import SbsError
 from sbs_sim.nodes.confinement import check_confinement, keep_to_this_machine
 from sbs_sim.nodes.executables import ignore_interruptions, when_interrupted
 from sbs_sim.nodes.number_fields import check_numbers, hint
+from sbs_sim.terminal.command_line import suggestion
 
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # What ROS raises where a name, a parameter or a setting of the environment makes a node impossible.

@@ -19,13 +19,13 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray, SimulationStatus
+from sbs_sim.flight.records import Event
 from sbs_sim.flight_loop import FlightLoop, Report
 from sbs_sim.nodes.arrivals import Arrivals
 from sbs_sim.nodes.company import Latecomers, Rivals
 from sbs_sim.nodes.conversions import event_message, fill_working_states, to_time
 from sbs_sim.nodes.host import COMPLAINT_PERIOD, EVENT_QOS, HEALTH_PERIOD, STATE_QOS, Topic, diagnostic
 from sbs_sim.nodes.state_bytes import StatusBytes, states_of
-from sbs_sim.simulation import Event
 
 HEARTBEAT = 1.0  # s of wall time between status and /clock of a flight at rest
 PUBLISHING_TIME = 10.0  # s for what is still to be published at the end

@@ -15,9 +15,9 @@ from ament_index_python.packages import get_package_share_directory
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from sbs_sim.errors import RecordingError
+from sbs_sim.flight.simulation import Simulation
 from sbs_sim.recording import LogWriter, message_definition, qos_profiles, type_hash
 from sbs_sim.recording.flight import attachments, simulation_metadata
-from sbs_sim.simulation import Simulation
 from sbs_sim.versions import surroundings, versions
 
 LONGEST_NAME = 60  # characters of the aircraft's that go into the file's

@@ -15,9 +15,9 @@ from rclpy.serialization import deserialize_message
 from sbs_msgs.srv import Record
 from sbs_sim import checks
 from sbs_sim.errors import RecordingError, SbsError
+from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.nodes.host import SERVICE_QOS, Component
-from sbs_sim.simulation import Simulation
 
 if TYPE_CHECKING:
     from sbs_sim.nodes.recorder import Recorder

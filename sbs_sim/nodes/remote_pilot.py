@@ -14,8 +14,8 @@ from std_srvs.srv import SetBool
 
 from sbs_msgs.msg import Controls, TrimPoint
 from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim
-from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.cockpit.told import Trimmed
+from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.nodes.conversions import controls_of
 from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS

@@ -31,8 +31,8 @@ from std_srvs.srv import SetBool
 
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.command_line import Parser, assignment
 from sbs_sim.errors import RecordingError, SbsError
+from sbs_sim.flight.refly import refly, started
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
 from sbs_sim.nodes.executables import INTERRUPTED, ignore_interruptions, when_interrupted
 from sbs_sim.nodes.host import (
@@ -47,14 +47,14 @@ from sbs_sim.nodes.host import (
     run,
 )
 from sbs_sim.nodes.recorder import Recorder, definition_file
-from sbs_sim.progress import progress_bar
 from sbs_sim.recording import Log, message_definition, read, recover
 from sbs_sim.recording.cdr import Fit, plain
 from sbs_sim.recording.definitions import parse, short_name
 from sbs_sim.recording.flight import TOLERANCE, Flight, Verification, flight_of, verify, whole_until
 from sbs_sim.recording.playback import Playback
 from sbs_sim.recording.roles import mixed, several
-from sbs_sim.simulation import begun, refly
+from sbs_sim.terminal.command_line import Parser, assignment
+from sbs_sim.terminal.progress import progress_bar
 from sbs_sim.versions import in_words
 
 Progress = Callable[[float, float], None]  # takes what is done and the total
@@ -177,8 +177,8 @@ class Replay(Component):
         try:
             self._await_others()
             for _ in itertools.count() if self._loop else range(1):
-                begun = time.monotonic()
-                if not self._play_once() or self._wait_until(begun + SHORTEST_PASS) is None:
+                started = time.monotonic()
+                if not self._play_once() or self._wait_until(started + SHORTEST_PASS) is None:
                     break
             if self._left_out:
                 listed = ", ".join(f"{count} of {topic}" for topic, count in sorted(self._left_out.items()))
@@ -388,13 +388,13 @@ def fly_with(
     """
     aircraft = changed(flight.aircraft, changes)
     # rotors of another speed have another step: what acted acts at the same time
-    step_size = begun(aircraft, flight.events, **flight.options).step_size
+    step_size = started(aircraft, flight.events, **flight.options).step_size
     shorter = flight.step_size / step_size
     events = tuple(
         replace(event, step=round(event.step * shorter), wind_step=round(event.wind_step * shorter))
         for event in flight.events
     )
-    simulation = begun(aircraft, events, **flight.options)
+    simulation = started(aircraft, events, **flight.options)
     log = Recorder(str(output), simulation, {"with": list(changes)})
     try:
         changed_flight = replace(flight, aircraft=aircraft, events=events)
@@ -660,7 +660,7 @@ def _fly_with(options: argparse.Namespace) -> int:
     """Fly the commands again, if they are all there."""
     log = read(options.file).flight(options.flight)
     flight = flight_of(log)
-    first = flight.events[0].step  # 0 but for a log that was begun in mid-flight
+    first = flight.events[0].step  # 0 but for a log that was started in mid-flight
     wanted = flight.steps[(flight.steps - first) * flight.step_size <= options.end + ROUNDING]
     last = int(wanted[-1]) if len(wanted) else first
     whole = whole_until(log)

@@ -15,8 +15,11 @@ from std_srvs.srv import SetBool
 from sbs_msgs.msg import SwashplateArray
 from sbs_msgs.srv import Reset, SetWind, Step
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.trim import TrimPoint, trim
+from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError, SimulationError, TrimError
+from sbs_sim.flight.simulation import AZIMUTH_STEP_DEG, METHOD, METHODS, Simulation
+from sbs_sim.flight.trim_point import TrimPoint
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
@@ -26,7 +29,6 @@ from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
 from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS, Component, Parameter, declare, heed, run
 from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.nodes.recording import Recording
-from sbs_sim.simulation import AZIMUTH_STEP_DEG, METHOD, METHODS, Simulation, trimmed_state
 
 OFF = "off"
 # How long a thread keeps the interpreter while the flight waits for it [s]; the 5 ms of Python are half a tick.

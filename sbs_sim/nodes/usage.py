@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from sbs_sim import command_line
 from sbs_sim.nodes.endpoints import Endpoint, endpoints
 from sbs_sim.nodes.host import Parameter
+from sbs_sim.terminal import command_line
 
 WIDTH = 100
 # Nodes that an executable brings up with its own.

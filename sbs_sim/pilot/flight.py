@@ -11,12 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.trim import TrimPoint
 from sbs_sim.errors import PilotError
-from sbs_sim.mixer import Mixer
+from sbs_sim.flight.history import History, history
+from sbs_sim.flight.mixer import Mixer
+from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.trim_point import TrimPoint
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import History, Simulation, history, trimmed_state
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
-from sbs_sim.analysis.linearize import LinearModel, settle
+from sbs_sim.analysis.linear_model import LinearModel, settle
 from sbs_sim.content import ByContent
 from sbs_sim.errors import PilotError
 from sbs_sim.model import state as S

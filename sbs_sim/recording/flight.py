@@ -17,11 +17,13 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.content import ByContent
 from sbs_sim.errors import RecordingError
+from sbs_sim.flight.records import Event, Snapshot
+from sbs_sim.flight.refly import refly
+from sbs_sim.flight.simulation import Simulation
 from sbs_sim.model.wind import Wind
 from sbs_sim.recording.log import Log, Topic
 from sbs_sim.recording.mcap_file import RECOVERY
 from sbs_sim.recording.roles import alike
-from sbs_sim.simulation import Event, Simulation, Snapshot, refly
 from sbs_sim.versions import differences
 
 Array = NDArray[np.float64]

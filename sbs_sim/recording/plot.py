@@ -13,11 +13,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sbs_sim.analysis.export import check_target, write
 from sbs_sim.errors import RecordingError
 from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
-from sbs_sim.plot_style import COLOURS, DASHES
+from sbs_sim.output.files import check_target, write
+from sbs_sim.output.plot_style import COLOURS, DASHES
 from sbs_sim.recording.log import Log, Topic
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import pytest
 from helpers import build
 
 from sbs_sim import Aircraft, Case, simulate, simulate_batch, trim
-from sbs_sim.batch import CANCELLED, GROUPS
+from sbs_sim.analysis.batch import CANCELLED, GROUPS
 from sbs_sim.errors import BatchError, SimulationError
 from sbs_sim.model.state import ATTITUDE
 from sbs_sim.model.wind import Wind

@@ -12,7 +12,7 @@ import pytest
 from test_commands import output
 
 from sbs_sim import Aircraft, Case, simulate_batch, sweep
-from sbs_sim.cluster import _call, _versions
+from sbs_sim.concurrency.cluster import _call, _versions
 from sbs_sim.errors import ClusterError
 from sbs_sim.model.wind import Wind
 

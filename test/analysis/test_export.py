@@ -11,9 +11,10 @@ import pytest
 import scipy.io
 
 from sbs_sim import linearize, trim
-from sbs_sim.analysis.export import plain, to_json, write
 from sbs_sim.errors import ExportError
 from sbs_sim.model.state import CONTROL_NAMES
+from sbs_sim.output.files import write
+from sbs_sim.output.json_text import plain, to_json
 
 
 @pytest.fixture(scope="module", params=["averaged", "paper"])
@@ -147,7 +148,7 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, before):
         path.write_text(before)
     code = f"""
 import resource
-from sbs_sim.analysis.export import write
+from sbs_sim.output.files import write
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 write({str(path)!r}, "x" * 2000)
 """

@@ -10,13 +10,13 @@ from scipy.linalg import expm
 
 from sbs_sim import Aircraft, linearize
 from sbs_sim.errors import PilotError, SimulationError
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.wind import Wind
 from sbs_sim.pilot import hover_hold as H
 from sbs_sim.pilot.feedback import Compensator, Plant, closed_loop, closed_loop_poles, disk_gains, lqr, margins
 from sbs_sim.pilot.flight import fly
-from sbs_sim.simulation import trimmed_state
 
 SMALL = 0.02  # m, rad: near enough for a linear model
 MIRROR = {"v": -1, "p": -1, "phi": -1, "r": -1, "right": -1, "heading": -1, "lateral_cyclic": -1}

@@ -8,12 +8,14 @@ import scipy.linalg
 from helpers import Model, aircraft_data, build, mirrored_data
 
 from sbs_sim import Aircraft, linearize, trim
-from sbs_sim.analysis.linearize import difference_steps, jacobians, kinematics, settle, used_states
+from sbs_sim.analysis.differences import difference_steps, jacobians, used_states
+from sbs_sim.analysis.kinematics import kinematics
+from sbs_sim.analysis.linear_model import settle
 from sbs_sim.errors import LinearizationError, TrimError
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import rotation_matrix
-from sbs_sim.simulation import trimmed_state
 
 FIDELITIES = [(False, False), (True, False), (True, True)]
 CONTROLS = S.CONTROL_NAMES

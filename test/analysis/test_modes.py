@@ -9,7 +9,7 @@ import pytest
 from helpers import build
 
 from sbs_sim import Aircraft, linearize, sweep, trim
-from sbs_sim.analysis.linearize import growing_rotor_modes_text
+from sbs_sim.analysis.linear_model import growing_rotor_modes_text
 from sbs_sim.analysis.modes import first_matrix_modes, modes
 from sbs_sim.model.state import LINEAR_BODY_NAMES, StateLayout, part_of
 

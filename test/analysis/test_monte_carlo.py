@@ -10,13 +10,13 @@ import pytest
 from test_commands import call, failure, output
 
 from sbs_sim import Case, simulate, simulate_batch
-from sbs_sim.analysis.export import to_json
 from sbs_sim.analysis.monte_carlo import OUTPUTS, SHARES, batch_to_csv, batch_to_dict, gust_cases, quantities
 from sbs_sim.analysis.monte_carlo_plots import SHOWN, batch_figure
 from sbs_sim.errors import AircraftError, BatchError, SimulationError
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.state import ATTITUDE
-from sbs_sim.simulation import trimmed_state
+from sbs_sim.output.json_text import to_json
 
 SPREAD = {"body.mass": 0.05, "rotors.blade_mass": 0.02}
 

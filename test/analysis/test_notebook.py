@@ -9,9 +9,9 @@ import pytest
 
 import sbs_sim
 from sbs_sim import linearize, simulate_batch, sweep, trim
-from sbs_sim.batch import Case
+from sbs_sim.analysis.batch import Case
 from sbs_sim.model import state as S
-from sbs_sim.notebook import MOST_ROWS
+from sbs_sim.output.notebook import MOST_ROWS
 
 VICIOUS = "<script>alert(\"1\")</script> & 'x'"
 

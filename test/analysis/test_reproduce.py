@@ -15,12 +15,12 @@ from helpers import Model, build
 from markup import HOSTILE, Elements, shown_as_text
 
 from sbs_sim.analysis.page import PAGE, inline_svg, page_text, save_page
-from sbs_sim.analysis.paper_tables import TABLES, contents, parse_pole, printed_tables
+from sbs_sim.analysis.paper_tables import TABLES, Cell, contents, parse_pole, printed_tables
 from sbs_sim.analysis.plots import drawings
-from sbs_sim.analysis.reproduce import MISMATCH, Cell, Entry, reproduce
+from sbs_sim.analysis.reproduce import MISMATCH, Entry, reproduce
 from sbs_sim.analysis.reproduce_remarks import REMARKS
 from sbs_sim.errors import ExportError
-from sbs_sim.simulation import trimmed_state
+from sbs_sim.flight.trimmed_state import trimmed_state
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 300.0  # s, generous, for machines that are busy

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from sbs_sim import linearize, sweep, trim
-from sbs_sim.analysis.export import sweep_to_csv, to_json
+from sbs_sim.analysis.export import sweep_to_csv
 from sbs_sim.analysis.sweep import CANCELLED
 from sbs_sim.analysis.sweep_plots import root_locus_figure, save_plots, trim_figure
 from sbs_sim.errors import ExportError, SweepError
 from sbs_sim.model import state as S
+from sbs_sim.output.json_text import to_json
 
 SPEEDS = np.linspace(-5.0, 20.0, 11)
 

@@ -9,11 +9,12 @@ from helpers import Model, aircraft_data, build, linear_airfoil, mirrored_data
 from sbs_sim import simulate, trim
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim_guess import MomentumTheory
-from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
+from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.errors import TrimError
+from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
-from sbs_sim.simulation import trimmed_state
 
 G, RHO = 9.80665, 1.225
 CONDITIONS = {

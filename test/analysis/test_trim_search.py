@@ -12,9 +12,10 @@ from random_aircraft import random_flights
 from sbs_sim import linearize, sweep, trim
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim_guess import MomentumTheory
-from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
+from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.trim_search import STALLED, _Search
 from sbs_sim.errors import TrimError
+from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model import state as S
 
 DATA = Path(__file__).resolve().parents[1] / "data"

@@ -12,12 +12,13 @@ from sbs_sim import trim
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import two_loop
 from sbs_sim.analysis.trim_guess import MomentumTheory
-from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem
+from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.two_loop import solve_by_two_loops
 from sbs_sim.errors import TrimError
+from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import state as S
 from sbs_sim.model.steady import steady_balance
-from sbs_sim.simulation import trimmed_state
 
 FIDELITIES = [(True, True), (True, False), (False, True), (False, False)]
 CONTROLS = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")

@@ -35,7 +35,6 @@ from websockets.typing import Subprotocol
 
 from sbs_msgs.msg import BodyState, FlightEvent, LinearModel, Mode, SimulationStatus
 from sbs_sim import Aircraft, linearize, simulate, trim
-from sbs_sim.analysis.trim import TrimCondition
 from sbs_sim.cockpit import geometry
 from sbs_sim.cockpit.charts import PERIOD, WINDOW, History, axis_range, body_charts, rotor_charts
 from sbs_sim.cockpit.gate import refusal
@@ -48,6 +47,9 @@ from sbs_sim.cockpit.told import Trimmed, condition_words, model_page, trim_page
 from sbs_sim.cockpit.view import Flown, View
 from sbs_sim.cockpit.viewpoint import CAMERAS, Viewpoint
 from sbs_sim.errors import RecordingError, SimulationError
+from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion, quaternion_to_euler
 from sbs_sim.model.multiblade import blade_matrix
@@ -56,7 +58,6 @@ from sbs_sim.nodes.cockpit_node import serve
 from sbs_sim.nodes.conversions import StateMessages, snapshot_of
 from sbs_sim.nodes.host import LATCHED_QOS
 from sbs_sim.recording import read
-from sbs_sim.simulation import Simulation, trimmed_state
 
 ROOT = Path(__file__).resolve().parents[2]
 HOVER_STEP = ROOT / "bags" / "hover_step.mcap"

@@ -9,18 +9,19 @@ import pytest
 from markup import HOSTILE, Elements, shown_as_text
 
 from sbs_sim import Aircraft, sweep, trim
+from sbs_sim.analysis.batch import simulate_batch
 from sbs_sim.analysis.monte_carlo import gust_cases
 from sbs_sim.analysis.monte_carlo_plots import batch_figure
 from sbs_sim.analysis.sweep_plots import save_plots
-from sbs_sim.analysis.trim import TrimCondition
-from sbs_sim.batch import simulate_batch
 from sbs_sim.cockpit.poles import Pole, pole_page
 from sbs_sim.cockpit.readouts import Status, readout, source_line
 from sbs_sim.cockpit.told import Trimmed, line, model_page, trim_page
 from sbs_sim.errors import AircraftError
+from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.recording import read
 from sbs_sim.recording.plot import plot
-from sbs_sim.simulation import Simulation, trimmed_state
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "sbs_sim"

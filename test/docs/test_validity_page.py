@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sbs_sim import trim, validity
+from sbs_sim import trim
+from sbs_sim.flight import validity
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "validity.md").read_text(encoding="utf-8")

@@ -18,7 +18,6 @@ import update_reference as reference  # noqa: E402
 
 import sbs_sim  # noqa: E402
 from sbs_sim import Aircraft  # noqa: E402
-from sbs_sim.command_line import suggestion  # noqa: E402
 from sbs_sim.commands import gusts as gusts_command  # noqa: E402
 from sbs_sim.commands import sweep as sweep_command  # noqa: E402
 from sbs_sim.commands.main import EXECUTABLES  # noqa: E402
@@ -26,6 +25,7 @@ from sbs_sim.errors import SweepError  # noqa: E402
 from sbs_sim.nodes import usage  # noqa: E402
 from sbs_sim.nodes.endpoints import endpoints  # noqa: E402
 from sbs_sim.pilot.hover_hold import LIMITS  # noqa: E402
+from sbs_sim.terminal.command_line import suggestion  # noqa: E402
 
 INSTALLED = ROOT / "install" / "sbs_sim" / "lib" / "sbs_sim"
 PATIENCE = 60.0  # s, generous, for machines that are busy

@@ -13,9 +13,10 @@ import sbs_sim
 from sbs_sim import Aircraft, Case, linearize, simulate_batch, sweep, trim
 from sbs_sim.analysis.floquet import floquet
 from sbs_sim.content import ByContent
+from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.wind import Wind
 from sbs_sim.pilot.hover_hold import HoverModel, design
-from sbs_sim.simulation import Simulation, trimmed_state
 
 
 def made(aircraft):

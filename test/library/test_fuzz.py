@@ -13,9 +13,8 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from sbs_sim import Aircraft, Simulation, linearize, simulate, sweep, trim
-from sbs_sim.analysis.export import save
+from sbs_sim.analysis.batch import Case, simulate_batch
 from sbs_sim.analysis.monte_carlo import gust_cases
-from sbs_sim.batch import Case, simulate_batch
 from sbs_sim.errors import AircraftError, RecordingError, SbsError
 from sbs_sim.model.wind import Wind
 from sbs_sim.pilot.flight import fly
@@ -96,10 +95,7 @@ WRONG_TYPES = {
         "flights = 1000000000: allowed are whole numbers from 1 to 1000000",
     ),
     "number for a pilot": (lambda ac: fly(ac, None, 3, 0.1), "pilot = 3: allowed are functions of time and state"),
-    "text for a model": (
-        lambda ac: save("sbs", "a.npz"),
-        "model = 'sbs': allowed are objects of the class LinearModel",
-    ),
+    "number for the file of a model": (lambda ac: linearize(ac).save(3), "path = 3: allowed are paths"),
     "number for a path": (lambda ac: ac.value(3), "path = 3: allowed are keys like body.mass"),
     "control characters in a path": (
         lambda ac: ac.value("body\x85"),

@@ -10,10 +10,11 @@ import time
 import psutil
 import pytest
 
-from sbs_sim import interruption, simulate_batch
-from sbs_sim.batch import Case
-from sbs_sim.interruption import InterruptedCallError
-from sbs_sim.parallel import compute
+from sbs_sim import simulate_batch
+from sbs_sim.analysis.batch import Case
+from sbs_sim.concurrency import interruption
+from sbs_sim.concurrency.interruption import InterruptedCallError
+from sbs_sim.concurrency.parallel import compute
 
 PATIENCE = 60.0  # s, generous, for machines that are busy
 CODE = """

@@ -10,11 +10,12 @@ import pytest
 
 from sbs_sim import Aircraft, Case, Simulation, simulate, simulate_batch, trim
 from sbs_sim.errors import SimulationError
+from sbs_sim.flight.blade_angles import blade_angles
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.state import ATTITUDE, BODY_SIZE, CONTROL_NAMES, POSITION, RATES, VELOCITY
 from sbs_sim.model.wind import Wind
 from sbs_sim.pilot import flight as piloted
-from sbs_sim.simulation import blade_angles, trimmed_state
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 DEG = math.pi / 180

@@ -15,7 +15,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from sbs_msgs.msg import BodyState, InflowArray, RotorStateArray, SimulationStatus, WorkingState
 from sbs_sim import Aircraft
-from sbs_sim.flight_records import Snapshot
+from sbs_sim.flight.blade_angles import blade_angles
+from sbs_sim.flight.records import Snapshot
 from sbs_sim.model.records import LOAD_SIZE
 from sbs_sim.nodes import templates
 from sbs_sim.nodes.conversions import StateMessages
@@ -24,7 +25,6 @@ from sbs_sim.nodes.templates import DOUBLE, LayoutError, Template
 from sbs_sim.recording import message_definition
 from sbs_sim.recording.cdr import Layout
 from sbs_sim.recording.definitions import parse
-from sbs_sim.simulation import blade_angles
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 KINDS = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "odom": Odometry}

@@ -19,12 +19,12 @@ from sbs_msgs.action import Sweep  # noqa: E402
 from sbs_msgs.msg import BodyState, LinearModel, SimulationStatus, TrimPoint  # noqa: E402
 from sbs_msgs.srv import Linearize, Trim  # noqa: E402
 from sbs_sim import Aircraft, Simulation, linearize, trim  # noqa: E402
-from sbs_sim.analysis.linearize import growing_rotor_modes_text  # noqa: E402
-from sbs_sim.analysis.trim import TrimCondition  # noqa: E402
+from sbs_sim.analysis.linear_model import growing_rotor_modes_text  # noqa: E402
+from sbs_sim.flight.trim_point import TrimCondition  # noqa: E402
+from sbs_sim.flight.trimmed_state import trimmed_state  # noqa: E402
 from sbs_sim.flight_loop import FlightLoop  # noqa: E402
 from sbs_sim.model import state as S  # noqa: E402
 from sbs_sim.nodes.remote_pilot import RemotePilot  # noqa: E402
-from sbs_sim.simulation import trimmed_state  # noqa: E402
 
 LONG = [0.02 * i for i in range(1000)]  # values of a sweep of half a minute, and more where others are busy
 TURN = {"airspeed": 12.0, "climb_rate": 1.0, "sideslip": 0.1, "turn_rate": 0.2}

@@ -16,10 +16,10 @@ import pytest
 
 from sbs_sim import Simulation, simulate
 from sbs_sim.errors import SimulationError
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight_loop import FAST_LENGTH, QUEUE_LENGTH, FlightLoop
 from sbs_sim.model.state import ATTITUDE, VELOCITY
 from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import trimmed_state
 
 PATIENCE = 20.0  # s until something that must happen is given up
 AS_FAST_AS_READ = 0.0

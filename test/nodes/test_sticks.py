@@ -10,6 +10,7 @@ from helpers import aircraft_data
 from sbs_sim import Aircraft, linearize, simulate
 from sbs_sim.aircraft import config_folder
 from sbs_sim.errors import PilotError
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import state as S
 from sbs_sim.pilot.augmentation import FED_BACK, StickPilot, augmentation
 from sbs_sim.pilot.feedback import Compensator, Plant, closed_loop
@@ -17,7 +18,6 @@ from sbs_sim.pilot.flight import fly
 from sbs_sim.pilot.hover_hold import DELAY, FILTER_TIME, TICK
 from sbs_sim.pilot.joystick import Joystick, JoystickFile
 from sbs_sim.pilot.sticks import RETURN_TIME, KeySticks, keys_of, shaped
-from sbs_sim.simulation import trimmed_state
 
 CONFIG = (config_folder() / "joystick.yaml").read_text()
 DATA = Path(__file__).resolve().parents[1] / "data"

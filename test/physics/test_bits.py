@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from sbs_sim import Simulation, simulate
-from sbs_sim.analysis.linearize import kinematics
+from sbs_sim.analysis.kinematics import kinematics
 from sbs_sim.analysis.newton import newton
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.airfoil import extend_polar
 from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import euler_angles, quaternion_to_euler
 from sbs_sim.model.solve import length, product
 from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import trimmed_state
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOL = ROOT / "tools" / "robustness" / "compare_bits.py"

@@ -11,13 +11,9 @@ from helpers import aircraft_data
 from sbs_sim import Aircraft, Case, Simulation, linearize, simulate, simulate_batch, sweep, trim
 from sbs_sim.analysis.export import sweep_to_csv
 from sbs_sim.errors import SimulationError
-from sbs_sim.model import state as S
-from sbs_sim.model import working_state as W
-from sbs_sim.model.airfoil import AirfoilTable, read_table, stall_angles
-from sbs_sim.model.frames import euler_to_quaternion
-from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import refly, trimmed_state
-from sbs_sim.validity import (
+from sbs_sim.flight.refly import refly
+from sbs_sim.flight.trimmed_state import trimmed_state
+from sbs_sim.flight.validity import (
     NORMAL,
     TURBULENT_WAKE,
     UNLOADED,
@@ -28,6 +24,11 @@ from sbs_sim.validity import (
     warnings,
     working_state,
 )
+from sbs_sim.model import state as S
+from sbs_sim.model import working_state as W
+from sbs_sim.model.airfoil import AirfoilTable, read_table, stall_angles
+from sbs_sim.model.frames import euler_to_quaternion
+from sbs_sim.model.wind import Wind
 
 GUST = 30.0  # m/s
 ATTITUDES = {

@@ -10,13 +10,14 @@ from test_conservation import ONE_SECOND, PSI, STEP, differences, disturbed
 
 from sbs_sim import Simulation, simulate, trim
 from sbs_sim.errors import SimulationError
+from sbs_sim.flight.rotor_matrices import rotor_matrices
+from sbs_sim.flight.simulation import METHODS
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import state as S
 from sbs_sim.model import wind as W
 from sbs_sim.model.exponential import coefficients
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.integrate import CLASSICAL, ETD, PARTITIONED, RK4, TSIT5, TSITOURAS
-from sbs_sim.rotor_matrices import rotor_matrices
-from sbs_sim.simulation import METHODS, trimmed_state
 
 QUARTER = 0.25  # s, ten revolutions
 FIVE_DEG = 720  # steps of 5 deg in that time

@@ -14,9 +14,9 @@ CODE = """
     import numpy as np
 
     from sbs_sim import Aircraft, Simulation, linearize, simulate, trim
-    from sbs_sim.engine import Engine
+    from sbs_sim.flight.engine import Engine
     from sbs_sim.model.average import azimuths
-    from sbs_sim.simulation import trimmed_state
+    from sbs_sim.flight.trimmed_state import trimmed_state
 
     aircraft = Aircraft.load("sbs")
     flat = trim(Aircraft.load("sbs_paper")) if "other" in sys.argv else None
@@ -66,7 +66,8 @@ def test_bits_do_not_depend_on_what_was_loaded_first(order):
 PLAIN = """
     import math
     import numba
-    from sbs_sim import Aircraft, Case, formation, linearize, simulate, simulate_batch, sweep, trim
+    from sbs_sim import Aircraft, Case, linearize, simulate, simulate_batch, sweep, trim
+    from sbs_sim.flight import formation
     from sbs_sim.model.wind import Wind
 
     small = Aircraft.load("sbs").with_value("options.elements", 2)

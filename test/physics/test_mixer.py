@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from sbs_sim import Aircraft
 from sbs_sim.errors import SimulationError
-from sbs_sim.mixer import Mixer
+from sbs_sim.flight.mixer import Mixer
 from sbs_sim.model.state import CONTROL_NAMES
 
 DATA = Path(__file__).resolve().parents[1] / "data"

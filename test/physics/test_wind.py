@@ -12,10 +12,11 @@ from scipy.signal import welch
 
 from sbs_sim import Simulation
 from sbs_sim.errors import SimulationError
+from sbs_sim.flight.simulate import simulate
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.frames import rotation_matrix
 from sbs_sim.model.state import VELOCITY
 from sbs_sim.model.wind import TURBULENCE_FROM, TURBULENCE_TO, WIND_SIZE, Wind, WindField, _noise_of_step
-from sbs_sim.simulation import simulate, trimmed_state
 
 
 def turbulence(wind, tick, count):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sbs_sim import Aircraft
-from sbs_sim.engine import Engine
+from sbs_sim.flight.engine import Engine
 from sbs_sim.model import records as R
 from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.packing import by_blades

@@ -7,7 +7,7 @@ import plain_model
 import pytest
 from helpers import Model, build, unit
 
-from sbs_sim import validity
+from sbs_sim.flight import validity
 from sbs_sim.model import state as S
 from sbs_sim.model import working_state as W
 from sbs_sim.model.frames import euler_to_quaternion, hub_axes, rotation_matrix

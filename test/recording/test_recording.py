@@ -29,6 +29,8 @@ from mcap.writer import CompressionType, IndexType, Writer
 from ruamel.yaml import YAML
 
 from sbs_sim.errors import RecordingError
+from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.recording import LogWriter, message_definition, qos_profiles, read, recover
 from sbs_sim.recording.cdr import Fit, Layout, decode, decode_one_by_one
 from sbs_sim.recording.definitions import SEQUENCE, Units, fields_of, parse, short_name
@@ -37,7 +39,6 @@ from sbs_sim.recording.mcap_file import NewFile, metadata_checksum
 from sbs_sim.recording.mcap_log import CHUNK_SIZE
 from sbs_sim.recording.playback import Playback
 from sbs_sim.recording.scan import LARGEST, Source, read_summary, scan
-from sbs_sim.simulation import Simulation, trimmed_state
 
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "robustness" / "crash_recording.py"
 NUMBER = "float64 value  # [m]\n"

@@ -10,8 +10,10 @@ from test_flight_loop import AS_FAST_AS_READ, flying, wait_until
 
 from sbs_sim import Simulation
 from sbs_sim.errors import SimulationError
+from sbs_sim.flight.records import Event
+from sbs_sim.flight.refly import refly
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import Event, refly, trimmed_state
 
 TURBULENCE = Wind(velocity=(3.0, 1.0, 0.0), turbulence_intensity=(1.0, 1.0, 0.5), turbulence_seed=7)
 

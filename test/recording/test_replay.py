@@ -254,8 +254,9 @@ def test_what_a_cut_log_is_compared_with_is_said(tmp_path, recorded):
 
 def test_a_log_without_states_is_no_flight(tmp_path):
     """As a simulator leaves it that is ended at once."""
+    from sbs_sim.flight.simulation import Simulation
+    from sbs_sim.flight.trimmed_state import trimmed_state
     from sbs_sim.nodes.recorder import Recorder
-    from sbs_sim.simulation import Simulation, trimmed_state
 
     aircraft = Aircraft.load("sbs")
     point = trim(aircraft)

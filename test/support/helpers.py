@@ -7,7 +7,8 @@ import numba
 import numpy as np
 
 from sbs_sim.aircraft import Aircraft, config_folder
-from sbs_sim.engine import Engine
+from sbs_sim.flight.engine import Engine
+from sbs_sim.flight.rotor_matrices import arranged, rotor_matrices
 from sbs_sim.lanes import as_lanes, as_records
 from sbs_sim.model import state as S
 from sbs_sim.model import wind as W
@@ -15,7 +16,6 @@ from sbs_sim.model.average import azimuths
 from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.frames import ONE
 from sbs_sim.model.integrate import ETD, FLYING, RK4, TSIT5, advance
-from sbs_sim.rotor_matrices import arranged, rotor_matrices
 
 CALM = np.zeros(3)
 VACUUM = {"air_density": 0.0}

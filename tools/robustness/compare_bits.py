@@ -30,10 +30,12 @@ from sbs_sim import Aircraft, Case, linearize, simulate, simulate_batch, sweep, 
 from sbs_sim.analysis.floquet import floquet
 from sbs_sim.analysis.monte_carlo import gust_cases
 from sbs_sim.errors import LinearizationError
-from sbs_sim.flight_records import Event
+from sbs_sim.flight.records import Event
+from sbs_sim.flight.refly import refly
+from sbs_sim.flight.simulation import METHODS, Simulation
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.airfoil import extend_polar
 from sbs_sim.model.wind import Wind
-from sbs_sim.simulation import METHODS, Simulation, refly, trimmed_state
 
 ROOT = Path(__file__).resolve().parents[2]
 AIRCRAFT = ("sbs", "sbs_paper", *(str(ROOT / f"test/data/{name}.yaml") for name in ("tail_rotor", "tandem", "uh60a")))

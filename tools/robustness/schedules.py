@@ -30,6 +30,8 @@ from sbs_msgs.msg import SwashplateArray
 from sbs_msgs.srv import Record
 from sbs_sim import Aircraft, trim
 from sbs_sim.errors import SbsError
+from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.ground import lowest_point
 from sbs_sim.model.wind import Wind
@@ -38,10 +40,9 @@ from sbs_sim.nodes.conversions import swashplate_messages
 from sbs_sim.nodes.host import COMMAND_QOS, Component, keep_to_this_machine
 from sbs_sim.nodes.outputs import Outputs
 from sbs_sim.nodes.recording import Recording
-from sbs_sim.progress import progress_bar
 from sbs_sim.recording import read
 from sbs_sim.recording.flight import flight_of, verify
-from sbs_sim.simulation import Simulation, trimmed_state
+from sbs_sim.terminal.progress import progress_bar
 
 GROUND = -4.0  # m
 # tick [s] and largest step [deg]: one, four and 29 steps to a tick, so that a contact comes at its border or within it

@@ -30,11 +30,11 @@ from random_aircraft import GRAVITY, KINDS, random_flights  # noqa: E402
 
 from sbs_sim import Aircraft, simulate, trim  # noqa: E402
 from sbs_sim.analysis import trim_problem  # noqa: E402
-from sbs_sim.analysis.trim import TrimPoint  # noqa: E402
 from sbs_sim.analysis.trim_guess import MomentumTheory  # noqa: E402
-from sbs_sim.analysis.trim_problem import TrimCondition, TrimProblem  # noqa: E402
+from sbs_sim.analysis.trim_problem import TrimProblem  # noqa: E402
 from sbs_sim.analysis.trim_search import STALLED  # noqa: E402
 from sbs_sim.errors import TrimError  # noqa: E402
+from sbs_sim.flight.trim_point import TrimCondition, TrimPoint  # noqa: E402
 
 SOLVED = 1e-8  # largest scaled residual of a trim
 LARGEST_UNKNOWN = 1.3  # rad; bounds of the least squares

@@ -19,15 +19,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.trim import TrimPoint, trim
+from sbs_sim.analysis.trim import trim
+from sbs_sim.concurrency.parallel import checked_workers, compute
 from sbs_sim.content import ByContent
 from sbs_sim.errors import BatchError, SbsError
+from sbs_sim.flight.controls import Commands
+from sbs_sim.flight.sortie import Sortie, fly_together, structure
+from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_angles
 from sbs_sim.model.packing import lane_count
 from sbs_sim.model.wind import Wind
-from sbs_sim.parallel import checked_workers, compute
-from sbs_sim.simulation import Commands, Sortie, fly_together, structure
 
 if TYPE_CHECKING:
     import distributed
@@ -86,7 +88,8 @@ class Batch(ByContent):
         Of each flight, why it ended early or did not begin, in one line; None for a whole flight. "cancelled" for
         what was not begun.
     warnings : tuple of tuple of str
-        Of each flight, where the model does not hold and what actuators would not do, see `sbs_sim.simulation.History`.
+        Of each flight, where the model does not hold and what actuators would not do, see
+        `sbs_sim.flight.history.History`.
     """
 
     cases: tuple[Case, ...]

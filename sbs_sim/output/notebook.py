@@ -10,9 +10,9 @@ import numpy as np
 from sbs_sim.model.state import CONTROL_NAMES
 
 if TYPE_CHECKING:
-    from sbs_sim.analysis.linearize import LinearModel
+    from sbs_sim.analysis.linear_model import LinearModel
     from sbs_sim.analysis.sweep import Sweep, SweepPoint
-    from sbs_sim.analysis.trim import TrimPoint
+    from sbs_sim.flight.trim_point import TrimPoint
 
 MOST_ROWS = 100  # of a sweep: half of them from its beginning, half from its end
 NUMBERS = "text-align:right;font-variant-numeric:tabular-nums"

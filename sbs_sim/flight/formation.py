@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.content import ByContent
-from sbs_sim.engine import Engine
 from sbs_sim.errors import SimulationError
-from sbs_sim.flight_records import Rows
+from sbs_sim.flight.engine import Engine
+from sbs_sim.flight.records import Rows
+from sbs_sim.flight.rotor_matrices import arranged
 from sbs_sim.model import state as S
 from sbs_sim.model.fly import fly
 from sbs_sim.model.frames import down_of
@@ -20,10 +21,9 @@ from sbs_sim.model.integrate import FLYING
 from sbs_sim.model.packing import lane_count, side_by_side
 from sbs_sim.model.records import LOAD_SIZE
 from sbs_sim.model.working_state import WORKING_SIZE
-from sbs_sim.rotor_matrices import arranged
 
 if TYPE_CHECKING:
-    from sbs_sim.simulation import Simulation
+    from sbs_sim.flight.simulation import Simulation
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.engine import points_engine
+from sbs_sim.flight.engine import points_engine
 from sbs_sim.model import state as S
 from sbs_sim.model.exponential import coefficients
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian

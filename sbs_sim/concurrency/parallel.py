@@ -10,8 +10,8 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol
 
 from sbs_sim import checks
+from sbs_sim.concurrency.interruption import until
 from sbs_sim.errors import ClusterError, SbsError
-from sbs_sim.interruption import until
 
 if TYPE_CHECKING:
     import distributed
@@ -121,7 +121,7 @@ def checked_workers(workers: int | None, dask: object, error: type[SbsError]) ->
 def _pool(workers: int, dask: "str | distributed.Client | None") -> AbstractContextManager[Pool]:
     if dask is None:
         return _threads(workers)
-    from sbs_sim.cluster import cluster
+    from sbs_sim.concurrency.cluster import cluster
 
     return cluster(dask)
 

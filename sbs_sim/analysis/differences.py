@@ -1,0 +1,89 @@
+"""Central differences of the model by linear states and controls (theory.md section 9)."""
+
+from __future__ import annotations  # `help` then shows types by their names
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.flight.engine import points_engine
+from sbs_sim.flight.trim_point import TrimPoint
+from sbs_sim.model import records as R
+from sbs_sim.model import state as S
+from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
+
+Array = NDArray[np.float64]
+
+VELOCITY_STEP, RATE_STEP, ATTITUDE_STEP = 0.05, 0.01, 1e-3  # m/s, rad/s, rad
+BLADE_STEP, BLADE_RATE_STEP, INFLOW_STEP, CONTROL_STEP = 1e-4, 1e-2, 1e-4, 1e-4  # rad, rad/s, 1, rad
+BODY_STEPS = {
+    **dict.fromkeys(("u", "v", "w"), VELOCITY_STEP),
+    **dict.fromkeys(("p", "q", "r"), RATE_STEP),
+    **dict.fromkeys(("theta", "phi"), ATTITUDE_STEP),
+}
+
+
+def difference_steps(aircraft: Aircraft, scale: float = 1.0) -> Array:
+    """Steps of the central differences for all linear states and the controls, shape (linear_size + 4,)."""
+    steps = [_state_step(name) for name in aircraft.layout.linear_names]
+    return scale * np.array(steps + [CONTROL_STEP] * len(S.CONTROL_NAMES))
+
+
+def _state_step(name: str) -> float:
+    part = S.part_of(name)
+    if part.family == "body":
+        return BODY_STEPS[name]
+    if part.family == "inflow":
+        return INFLOW_STEP
+    return BLADE_RATE_STEP if part.is_rate else BLADE_STEP
+
+
+def used_states(point: TrimPoint) -> NDArray[np.int64]:
+    """Places in the linear state of those that the fidelity of a trim has."""
+    parts = [S.part_of(name) for name in point.state_names]
+    used = [
+        i
+        for i, part in enumerate(parts)
+        if (point.lead_lag or part.family != "lag")
+        and (point.cyclic_inflow or part.family != "inflow" or part.harmonic == 0)
+    ]
+    return np.array(used)
+
+
+def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) -> Array:
+    """Derivatives of all outputs of `sbs_sim.model.linear` by states and controls, at each azimuth.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    point : TrimPoint
+    psi : ndarray, shape (n_azimuths, n_rotors)
+        [rad]
+    steps : ndarray, shape (linear_size + 4,)
+
+    Returns
+    -------
+    ndarray, shape (n_azimuths, linear_size + 3 + 8 n_rotors, linear_size + 4)
+        Columns of states that the fidelity leaves out are zero.
+    """
+    engine = points_engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
+    inputs = np.concatenate([point.state, point.controls])
+    outputs = len(point.state) + SPECIFIC_FORCE_SIZE + R.LOAD_SIZE * engine.rotors
+    used = np.zeros(len(inputs), dtype=bool)
+    used[used_states(point)] = used[len(point.state) :] = True
+    result = np.zeros((len(psi), len(inputs), outputs))
+    jacobian(
+        *(
+            engine.code.derivative,
+            engine.model,
+            inputs,
+            aircraft.mixing,
+            np.where(used, steps, 0.0),
+            np.append(aircraft.layout.linear_owners, np.full(len(S.CONTROL_NAMES), engine.rotors)),
+            psi,
+            engine.work,
+            engine.tick,
+        ),
+        *(engine.memory(len(inputs)), np.zeros((2, outputs)), np.zeros(engine.n, dtype=np.int64), result),
+    )
+    return result.transpose(0, 2, 1)

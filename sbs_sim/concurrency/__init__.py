@@ -1,0 +1,1 @@
+"""Many calls at once: threads, clusters, and how they are interrupted."""

@@ -1,0 +1,1 @@
+"""Flight in time: simulations, whole flights, and what flies them."""

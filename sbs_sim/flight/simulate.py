@@ -1,0 +1,86 @@
+"""`simulate`: a whole flight in one call."""
+
+from __future__ import annotations  # `help` then shows types by their names
+
+import math
+
+from numpy.typing import ArrayLike
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.flight.controls import Commands
+from sbs_sim.flight.history import History
+from sbs_sim.flight.simulation import AZIMUTH_STEP, METHOD
+from sbs_sim.flight.sortie import Sortie, fly_together
+from sbs_sim.flight.trim_point import TrimPoint
+from sbs_sim.model.wind import Wind
+
+
+def simulate(
+    aircraft: Aircraft,
+    start: TrimPoint | ArrayLike,
+    controls: Commands,
+    duration: float,
+    *,
+    tick: float = 0.01,
+    azimuth_step: float = AZIMUTH_STEP,
+    lead_lag: bool = True,
+    cyclic_inflow: bool = True,
+    method: str = METHOD,
+    wind: Wind | None = None,
+    ground_altitude: float = -math.inf,
+    actuators: bool = False,
+) -> History:
+    """Fly for a while and return what happened.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    start : TrimPoint or ndarray, shape (size,)
+        A trim point, flown from the origin heading north, or a simulation state.
+    controls : array_like or callable
+        Pilot controls [rad]: shape (4,) for the whole flight, shape (n, 4) one row per tick (the last is held), or a
+        function of time [s] that gives shape (4,).
+    duration : float
+        [s], rounded to whole ticks.
+    tick, azimuth_step, lead_lag, cyclic_inflow, method, wind, ground_altitude
+        See `Simulation`. A trim point is flown with the velocity of the steady wind added.
+    actuators : bool
+        False: controls must be within their ranges, and the swashplates follow them at once, as linear models have it;
+        steps that their actuators would not follow are told in `warnings`. True: the mixer of the live flight is
+        between them. It clips controls and angles to their ranges, which is told, and moves the swashplates at the
+        rates of their actuators.
+
+    Returns
+    -------
+    History
+        Mapping of names to arrays, over the n instants between and at the ends of n - 1 ticks: "time" (n,) [s],
+        "controls" (n, 4), "swashplate" (n, n_rotors, 3) [rad], "acceleration" (n, 3) [m/s^2], "thrust" [N], "torque"
+        [N m], "power" [W] (n, n_rotors), "state" (n, size) and every name of the simulation state (n,), "phi", "theta",
+        "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed relative to the air [m/s]. `warnings` tells
+        where the model does not hold.
+
+    Raises
+    ------
+    SimulationError
+        See `Simulation`; controls beyond their ranges, naming control, time, value and range, or more rows of them than
+        ticks; the flight cannot go on.
+    """
+    sortie = Sortie(
+        aircraft,
+        start,
+        controls,
+        duration,
+        wind=wind,
+        actuators=actuators,
+        tick=tick,
+        azimuth_step=azimuth_step,
+        lead_lag=lead_lag,
+        cyclic_inflow=cyclic_inflow,
+        method=method,
+        ground_altitude=ground_altitude,
+    )
+    fly_together([sortie])
+    flown, fault = sortie.result()
+    if fault is not None:
+        raise fault
+    return flown

@@ -1,0 +1,389 @@
+"""Flight in time: a stateful `Simulation` that advances tick by tick.
+
+A tick is the period at which states are handed out and commands taken in; it holds a whole number of integration
+steps. Steps are counted in integers from the start, and time is step x dt, so that the same commands at the same steps
+give the same flight to the last bit.
+"""
+
+from __future__ import annotations  # `help` then shows types by their names
+
+import math
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sbs_sim import checks
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.errors import SimulationError
+from sbs_sim.flight.engine import Engine
+from sbs_sim.flight.formation import Flown, Formation
+from sbs_sim.flight.records import Event, Snapshot
+from sbs_sim.flight.rotor_matrices import RotorMatrices, arranged, rotor_matrices
+from sbs_sim.model import state as S
+from sbs_sim.model.dynamics import derivative
+from sbs_sim.model.frames import down_of
+from sbs_sim.model.ground import lowest_point
+from sbs_sim.model.integrate import ETD, FLYING, PARTITIONED, RK4, TSIT5, advance, azimuths_at
+from sbs_sim.model.solve import length
+from sbs_sim.model.wind import Wind, WindField, winds_at
+from sbs_sim.model.working_state import WORKING_SIZE, working_state
+
+Array = NDArray[np.float64]
+
+UNIT = 1e-9  # a quaternion whose norm is this near to one is a unit quaternion
+METHODS = {"etd": ETD, "rk4": RK4, "tsit5": TSIT5, "partitioned": PARTITIONED}
+METHOD = "etd"  # by default
+TICKS = (1e-4, 1.0)  # s, shortest and longest
+AZIMUTH_STEPS = (math.radians(0.01), math.radians(45.0))  # rad
+AZIMUTH_STEP_DEG = 14.4  # by default: docs/speed.md has its errors
+AZIMUTH_STEP = math.radians(AZIMUTH_STEP_DEG)
+
+# A tick is one uninterrupted call of compiled code; this many steps take it a tenth of a second.
+MOST_STEPS_PER_TICK = 10_000
+MOST_WIND_TICKS = 1_000_000_000  # that turbulence is brought forward by for a log that begins in mid-flight: minutes
+WATCH_PERIOD = 0.1  # s of flight between looks whether the model holds
+
+# Beyond these magnitudes a state is not plausible and the simulation stops. The angles and the inflow are far outside
+# the validity of the model; the velocity is beyond the speed of sound.
+PLAUSIBLE_POSITION = 1e8  # m
+PLAUSIBLE_VELOCITY = 350.0  # m/s
+PLAUSIBLE_RATE = 100.0  # rad/s
+PLAUSIBLE_ANGLE = 1.5  # rad, multiblade coordinates of flap and lag
+PLAUSIBLE_INFLOW = 1.0
+
+
+class Simulation:
+    """An aircraft in flight.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    state : ndarray, shape (size,)
+        Simulation state at the start.
+    swashplate : ndarray, shape (n_rotors, 3)
+        Angles until others are set [rad].
+    tick : float
+        Length of a tick [s], 1e-4 to 1.
+    azimuth_step : float
+        Largest step of the fastest rotor's azimuth [rad]; the step is the tick divided by the smallest whole number
+        that keeps to it.
+    lead_lag, cyclic_inflow : bool
+        Fidelity.
+    method : str
+        "etd", of fourth order, which solves what is stiff in the rotors exactly; "rk4", the classical one; "tsit5", of
+        fifth order; or "partitioned": the paper's scheme,
+        whose error is of first order in the step.
+    wind : Wind
+    ground_altitude : float
+        Height of level ground above the origin [m]; touching it ends the flight. -inf is no ground.
+
+    Raises
+    ------
+    SimulationError
+        A value out of range or a state that is not plausible, naming it.
+    """
+
+    def __init__(
+        self,
+        aircraft: Aircraft,
+        state: ArrayLike,
+        swashplate: ArrayLike,
+        *,
+        tick: float = 0.01,
+        azimuth_step: float = AZIMUTH_STEP,
+        lead_lag: bool = True,
+        cyclic_inflow: bool = True,
+        method: str = METHOD,
+        wind: Wind | None = None,
+        ground_altitude: float = -math.inf,
+    ) -> None:
+        checks.instance("aircraft", aircraft, Aircraft, SimulationError)
+        tick = checks.number("tick", tick, *TICKS, "s", SimulationError)
+        azimuth_step = checks.number("azimuth_step", azimuth_step, *AZIMUTH_STEPS, "rad", SimulationError)
+        lead_lag = checks.flag("lead_lag", lead_lag, SimulationError)
+        cyclic_inflow = checks.flag("cyclic_inflow", cyclic_inflow, SimulationError)
+        checks.choice("method", method, tuple(METHODS), SimulationError)
+        ground = checks.number("ground_altitude", ground_altitude, -math.inf, PLAUSIBLE_POSITION, "m", SimulationError)
+        self.options: dict[str, Any] = {
+            "tick": tick,
+            "azimuth_step": azimuth_step,
+            "lead_lag": lead_lag,
+            "cyclic_inflow": cyclic_inflow,
+            "method": method,
+            "ground_altitude": ground,
+        }
+        self.aircraft = aircraft
+        self.layout = aircraft.layout
+        self.tick = tick
+        fastest = max(rotor.speed for rotor in aircraft.rotors)
+        # the margin keeps a step that is right but for rounding from being cut once more
+        self.steps_per_tick = max(1, math.ceil(fastest * tick / azimuth_step * (1 - 1e-12)))
+        if self.steps_per_tick > MOST_STEPS_PER_TICK:
+            raise SimulationError(
+                f"azimuth_step = {math.degrees(azimuth_step):g} deg takes {self.steps_per_tick} steps in a tick of"
+                f" {tick:g} s: allowed are up to {MOST_STEPS_PER_TICK}"
+            )
+        self.step_size = tick / self.steps_per_tick
+        self.method = METHODS[method]
+        self.model = aircraft.model(lead_lag, cyclic_inflow)
+        self.bounds = np.append(plausible_bounds(aircraft), -ground)
+        self.watch = max(1, round(WATCH_PERIOD / tick))
+        self.azimuth0 = np.zeros(len(aircraft.rotors))
+        self._held = held_states(aircraft, lead_lag, cyclic_inflow)
+        self.step = 0
+        self.set_wind(Wind() if wind is None else wind)
+        self.state = self.checked_state(state)
+        self.swashplate = self.checked_swashplate(swashplate)
+
+    @cached_property
+    def engine(self) -> Engine:
+        """What flies this aircraft alone."""
+        options = self.options["lead_lag"], self.options["cyclic_inflow"]
+        return Engine(self.aircraft.arranged(*options, "blades"), self.method, arranged([self.rotor_matrices]))
+
+    @property
+    def rotor_matrices(self) -> RotorMatrices | None:
+        """What the exponential method needs; None for other methods."""
+        if self.method != ETD:
+            return None
+        return rotor_matrices(self.aircraft, self.options["lead_lag"], self.options["cyclic_inflow"], self.step_size)
+
+    @property
+    def time(self) -> float:
+        """Simulation time [s]."""
+        return self.step * self.step_size
+
+    @property
+    def wind(self) -> Wind:
+        """The wind in force."""
+        return self._field.wind
+
+    def beginning(self) -> Event:
+        """The present as the start of a flight."""
+        swashplate, state = self.swashplate.copy(), self.state.copy()
+        return Event(self.step, "start", swashplate, state, self.wind, self._wind_step, self._field.ticks)
+
+    def go_on_from(self, start: Event) -> None:
+        """Take step, and with it time and azimuths, and the age of the wind from the start of a log.
+
+        Raises
+        ------
+        SimulationError
+            The start is before its wind, or long after it.
+        """
+        checks.whole("wind_step", start.wind_step, 0, start.step, SimulationError)
+        checks.whole("wind_ticks", start.wind_ticks, 0, MOST_WIND_TICKS, SimulationError)
+        self.step, self._wind_step = start.step, start.wind_step
+        self._field = WindField(self.wind, start.wind_step * self.step_size, self.tick)
+        self._air = self._field.tick_number(max(1, start.wind_ticks))
+
+    def act(self, event: Event) -> None:
+        """Let an event act; one with a state resets.
+
+        Raises
+        ------
+        SimulationError
+            See `reset`, `set_swashplate`.
+        """
+        if event.state is not None and event.swashplate is not None:
+            self.reset(event.state, event.swashplate)
+        elif event.swashplate is not None:
+            self.set_swashplate(event.swashplate)
+        if event.wind is not None:
+            self.set_wind(event.wind)
+
+    def checked_state(self, state: ArrayLike) -> Array:
+        """Copy of a simulation state that is complete, finite and plausible.
+
+        Its quaternion is normalised, and what the fidelity holds at zero is zero.
+
+        Raises
+        ------
+        SimulationError
+            Naming the state, its value and what is allowed.
+        """
+        values = checks.array("state", state, SimulationError).ravel()
+        if len(values) != self.layout.size:
+            raise SimulationError(f"state has {len(values)} values: allowed are {self.layout.size}")
+        for name, value, bound in zip(self.layout.names, values, self.bounds[:-1], strict=True):
+            if not abs(value) <= bound:  # true for a NaN as well
+                raise SimulationError(f"state {name} = {value}: allowed are {-bound:g} to {bound:g}")
+        quaternion = values[S.ATTITUDE : S.ATTITUDE + 4]
+        norm = length(quaternion)
+        if not 0.5 <= norm <= 2.0:
+            raise SimulationError(f"state attitude has a norm of {norm:g}: allowed are 0.5 to 2, a unit quaternion")
+        if abs(norm - 1.0) > UNIT:  # what has been normalised once stays as it is, bit for bit
+            values[S.ATTITUDE : S.ATTITUDE + 4] = quaternion / norm
+        values[self._held] = 0.0
+        deepest = np.zeros((1, 1))
+        lowest_point(self.model.rotors, values[:, np.newaxis], deepest)
+        lowest, ground = -float(deepest[0, 0]), -self.bounds[-1]
+        if lowest <= ground:
+            raise SimulationError(
+                f"state position: the aircraft reaches down to {lowest:g} m: allowed is above {ground:g} m, the ground"
+            )
+        return values
+
+    def checked_swashplate(self, angles: ArrayLike) -> Array:
+        """Copy of the swashplate angles of all rotors [rad], shape (n_rotors, 3), if each is within its range.
+
+        Raises
+        ------
+        SimulationError
+            Naming rotor, angle, value and range.
+        """
+        values = checks.array("swashplate", angles, SimulationError)
+        rotors = self.aircraft.rotors
+        if values.shape != (len(rotors), 3):
+            if values.ndim == 2 and values.shape[1] == 3:
+                allowed = f"{len(rotors)}, those of the aircraft"
+                raise SimulationError(f"swashplate has {len(values)} rotors: allowed are {allowed}")
+            raise SimulationError(f"swashplate has shape {values.shape}: allowed is {(len(rotors), 3)}")
+        for rotor, row in zip(rotors, values, strict=True):
+            ranges = (rotor.collective_range, rotor.cyclic_range, rotor.cyclic_range)
+            for name, value, (low, high) in zip(S.SWASHPLATE_NAMES, row, ranges, strict=True):
+                if not low - 1e-12 <= value <= high + 1e-12:
+                    raise SimulationError(f"{rotor.name} {name} = {value}: allowed are {low:.6g} to {high:.6g} rad")
+        return values
+
+    def set_swashplate(self, angles: ArrayLike) -> None:
+        """Set the swashplate angles from the next tick on; see `checked_swashplate`."""
+        self.swashplate = self.checked_swashplate(angles)
+
+    def set_wind(self, wind: Wind) -> None:
+        """Set the wind from the next tick on; gust delays count from now."""
+        checks.instance("wind", wind, Wind, SimulationError)
+        self._wind_step = self.step
+        self._field = WindField(wind, self.time, self.tick)
+        self._air = self._field.next_tick()
+
+    def reset(self, state: ArrayLike, swashplate: ArrayLike) -> None:
+        """Put the aircraft elsewhere; time, azimuths and wind go on."""
+        new_state, new_angles = self.checked_state(state), self.checked_swashplate(swashplate)
+        self.state, self.swashplate = new_state, new_angles
+
+    def advance(self) -> None:
+        """Fly one tick.
+
+        Raises
+        ------
+        SimulationError
+            The next step would leave the finite or the plausible: the message names step, time and state. The state
+            is that of the last good step.
+        """
+        engine, culprit = self.engine, np.full(1, FLYING)
+        advance(
+            *(
+                engine.code.derivative,
+                engine.model,
+                _single(self.state),
+                _single(self.swashplate),
+                _single(self.azimuth0),
+            ),
+            *(self.step, self.steps_per_tick, self.step_size, _single(self._air), self.method, _single(self.bounds)),
+            *(engine.work, engine.tick, engine.tick.done, culprit),
+        )
+        self.step += int(engine.tick.done[0])
+        if culprit[0] != FLYING:
+            raise self.end(int(culprit[0]), float(engine.tick.last[min(culprit[0], engine.size - 1), 0]))
+        self._air = self._field.next_tick()
+
+    def end(self, culprit: int, value: float) -> SimulationError:
+        """Why the flight cannot go on: a state that the next step would take to a value beyond the plausible."""
+        if culprit == self.layout.size:
+            speed = math.sqrt(sum(float(part) ** 2 for part in self.state[S.VELOCITY : S.RATES]))
+            return SimulationError(
+                f"ground contact after step {self.step} (t = {self.time:.4f} s) at {speed:.3g} m/s:"
+                f" the ground is at {-self.bounds[-1]:g} m"
+            )
+        return SimulationError(
+            f"step {self.step + 1} (t = {(self.step + 1) * self.step_size:.4f} s) would take"
+            f" {self.layout.names[culprit]} to {value:g}: plausible are magnitudes"
+            f" up to {self.bounds[culprit]:g}"
+        )
+
+    def fly(self, swashplates: Array, ticks: int, every: int = 1, loaded: bool = True) -> Flown:
+        """Fly many ticks in one call of compiled code, see `Formation.fly`.
+
+        To the last bit it is what `set_swashplate`, `snapshot` and `advance` give tick by tick.
+        """
+        return Formation([self]).fly([swashplates], ticks, every, loaded)[0]
+
+    def go_on(self, step: int, state: Array, air: Array, swashplate: Array) -> None:
+        """Take over what a flight in a formation has come to, with the air of its next tick."""
+        self.step, self.state, self._air, self.swashplate = step, state, air, swashplate
+
+    def air_ahead(self, ticks: int) -> Array:
+        """Air of this tick and of so many that follow, shape (ticks + 1, WIND_SIZE)."""
+        return np.concatenate([self._air[np.newaxis], self._field.next_ticks(ticks)])
+
+    def air_at(self, steps: NDArray[np.int64], air: Array) -> Array:
+        """Velocity of the air at the beginnings of ticks, NED [m/s], shape (n, 3)."""
+        velocities = np.zeros((len(steps), 3, 1))
+        times = np.multiply(steps, self.step_size, dtype=float)
+        winds_at(np.ascontiguousarray(air)[..., np.newaxis], times, self.model.rotors, velocities)
+        return velocities[..., 0]
+
+    def azimuths(self, steps: NDArray[np.int64]) -> Array:
+        """Azimuth of every rotor at steps, shape (n, n_rotors) [rad], 0 to 2 pi."""
+        angles = np.empty((len(steps), len(self.azimuth0), 1))
+        times = np.multiply(steps, self.step_size, dtype=float)
+        azimuths_at(self.model.rotors, _single(self.azimuth0), times, angles)
+        return angles[..., 0]
+
+    def snapshot(self) -> Snapshot:
+        """The present instant, with loads and accelerations under the swashplate angles now in force."""
+        engine, now = self.engine, np.array([self.step])
+        azimuth, air = self.azimuths(now)[0], self.air_at(now, self._air[np.newaxis])[0]
+        working = engine.memory(engine.rotors, WORKING_SIZE)
+        derivative(
+            *(engine.model, _single(self.state), _single(self.swashplate), _single(azimuth), _single(air)),
+            *(engine.work, engine.tick.slopes[0], True),
+        )
+        working_state(engine.model, engine.work, working)
+        down = down_of(self.state[np.newaxis, S.ATTITUDE : S.VELOCITY])[0]
+        return Snapshot(
+            step=self.step,
+            time=self.time,
+            state=self.state.copy(),
+            acceleration=engine.work.vector[:3, 0] + down * self.aircraft.environment.gravity,
+            swashplate=self.swashplate.copy(),
+            azimuth=azimuth,
+            loads=engine.work.load_rows.reshape(engine.rotors, -1).copy(),
+            wind=air,
+            working=working[..., 0],
+        )
+
+
+def _single(values: Array) -> Array:
+    """Numbers of a flight as the only lane: the same memory."""
+    return values.reshape(-1, 1)
+
+
+def plausible_bounds(aircraft: Aircraft) -> Array:
+    """Largest plausible magnitude of every state, shape (size,)."""
+    layout = aircraft.layout
+    bounds = np.full(layout.size, PLAUSIBLE_INFLOW)
+    bounds[: S.ATTITUDE] = PLAUSIBLE_POSITION
+    bounds[S.ATTITUDE : S.VELOCITY] = 2.0
+    bounds[S.VELOCITY : S.RATES] = PLAUSIBLE_VELOCITY
+    bounds[S.RATES : S.BODY_SIZE] = PLAUSIBLE_RATE
+    for j, rotor in enumerate(aircraft.rotors):
+        bounds[layout.flap(j)] = bounds[layout.lag(j)] = PLAUSIBLE_ANGLE
+        bounds[layout.flap_rate(j)] = bounds[layout.lag_rate(j)] = PLAUSIBLE_ANGLE * 10 * rotor.speed
+    return bounds
+
+
+def held_states(aircraft: Aircraft, lead_lag: bool, cyclic_inflow: bool) -> NDArray[np.int64]:
+    """Places of the states that stay zero without lag or without cyclic inflow."""
+    layout = aircraft.layout
+    index = np.arange(layout.size)
+    held: list[int] = []
+    for j in range(len(aircraft.rotors)):
+        if not lead_lag:
+            held += [*index[layout.lag(j)], *index[layout.lag_rate(j)]]
+        if not cyclic_inflow:
+            held += [*index[layout.inflow(j)][1:]]
+    return np.array(held, dtype=np.int64)

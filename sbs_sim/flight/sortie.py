@@ -1,0 +1,180 @@
+"""A whole flight under commands, alone or side by side with others."""
+
+from __future__ import annotations  # `help` then shows types by their names
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sbs_sim import checks
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.concurrency import interruption
+from sbs_sim.errors import SimulationError
+from sbs_sim.flight.actuation import Direct, Mixed, commanded_angles
+from sbs_sim.flight.controls import Commands, check_rows, command
+from sbs_sim.flight.formation import Flown, Formation
+from sbs_sim.flight.history import History, named_histories
+from sbs_sim.flight.records import Rows
+from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.trim_point import TrimPoint
+from sbs_sim.flight.trimmed_state import trimmed_state
+from sbs_sim.flight.validity import flight_warnings
+from sbs_sim.model.wind import Wind
+
+Array = NDArray[np.float64]
+
+# Ticks that whole flights take in one call, and elements of blades in all steps of these: a tenth of a second, in which
+# no interruption is heard.
+BLOCK, BLOCK_ELEMENTS = 1000, 3_500_000
+
+
+class Sortie:
+    """A flight under commands: what it is to be, and what became of it.
+
+    Parameters
+    ----------
+    aircraft, start, controls, duration, wind, actuators
+        See `simulate`.
+    every : int
+        Ticks from one row of the histories to the next.
+    loaded : bool
+        False leaves "acceleration", "thrust", "torque", "power" and "V" out.
+    **options :
+        The others of `Simulation`.
+
+    Raises
+    ------
+    SimulationError
+        The flight cannot begin.
+
+    Attributes
+    ----------
+    simulation : Simulation
+    ticks : int
+        Of the whole flight.
+    fault : SimulationError or None
+        Why it has ended early.
+    """
+
+    def __init__(
+        self,
+        aircraft: Aircraft,
+        start: TrimPoint | ArrayLike,
+        controls: Commands,
+        duration: float,
+        *,
+        every: int = 1,
+        loaded: bool = True,
+        wind: Wind | None = None,
+        actuators: bool = False,
+        **options: Any,
+    ) -> None:
+        checks.instance("aircraft", aircraft, Aircraft, SimulationError)
+        duration = checks.number("duration", duration, 0.0, 1e6, "s", SimulationError)
+        actuators = checks.flag("actuators", actuators, SimulationError)
+        air = Wind() if wind is None else wind
+        checks.instance("wind", air, Wind, SimulationError)
+        state = trimmed_state(aircraft, start, wind=air.velocity) if isinstance(start, TrimPoint) else start
+        stand = start.swashplate if isinstance(start, TrimPoint) else None
+        pilot_command = command(controls)
+        self._pilot = (Mixed if actuators else Direct)(aircraft, pilot_command, stand)
+        angles = self._pilot.angles(pilot_command(0, 0.0), 0.0)
+        self.simulation = Simulation(aircraft, state, angles, wind=air, **options)
+        self.ticks = round(duration / self.simulation.tick)
+        check_rows(controls, self.ticks, self.simulation.tick)
+        self.every, self.loaded = every, loaded
+        self.fault: SimulationError | None = None
+        self._blocks: list[tuple[Rows, Array]] = []
+        self._looks: list[Array] = []
+        self._given, self._begin = np.empty(0), 0
+        self._wrong: SimulationError | None = None
+
+    def commanded(self, begin: int, end: int) -> Array:
+        """Swashplate angles [rad] of ticks, as many as there are right commands for."""
+        self._given, angles, self._wrong = commanded_angles(self.simulation, self._pilot, begin, end)
+        self._begin = begin
+        return angles
+
+    def take(self, flown: Flown) -> None:
+        """Take over what the ticks that were commanded have given."""
+        ticks = flown.rows.step // self.simulation.steps_per_tick - self._begin
+        count = int(np.count_nonzero(ticks < len(self._given)))
+        self._blocks.append((flown.rows.first(count), self._given[ticks[:count]]))
+        self._looks.append(flown.working[flown.watched < len(self._given)])
+        self.fault = flown.fault if flown.ticks < len(self._given) else None
+        self.fault = self.fault or self._wrong
+
+    def end(self) -> None:
+        """End where not even the first tick has a right command."""
+        self.fault = self._wrong
+
+    def result(self) -> tuple[History, SimulationError | None]:
+        """Histories up to the last good tick, see `simulate`, and why the flight ended early, or None.
+
+        Raises
+        ------
+        SimulationError
+            Not even the first tick was flown.
+        """
+        if not self._blocks and self.fault is not None:
+            raise self.fault
+        aircraft = self.simulation.aircraft
+        working = np.concatenate(self._looks)
+        told = (*flight_warnings(aircraft, working), *self._pilot.told(self.simulation.tick))
+        return History(named_histories(aircraft, self._blocks, self.loaded), told), self.fault
+
+
+def fly_together(sorties: Sequence[Sortie]) -> None:
+    """Fly one flight, or several side by side, to their ends: each as it would on its own to the last bit.
+
+    Parameters
+    ----------
+    sorties : sequence of Sortie
+        One, or up to `sbs_sim.model.packing.lane_count()` with `structure` and ticks in common.
+    """
+    formation, first = Formation([sortie.simulation for sortie in sorties]), sorties[0]
+    size = _block(first.simulation, len(sorties))
+    for begin in range(0, first.ticks + 1, size):
+        interruption.look()
+        end = min(begin + size, first.ticks + 1)
+        flying = [sortie.fault is None for sortie in sorties]
+        angles = [
+            sortie.commanded(begin, end) if one else np.empty(0) for sortie, one in zip(sorties, flying, strict=True)
+        ]
+        most = max(map(len, angles))
+        if most:
+            padded = [_padded(own, most, sortie.simulation) for own, sortie in zip(angles, sorties, strict=True)]
+            flown = formation.fly(padded, min(most, first.ticks - begin), first.every, first.loaded)
+        for lane, (sortie, own) in enumerate(zip(sorties, angles, strict=True)):
+            if flying[lane] and len(own):
+                sortie.take(flown[lane])
+            elif flying[lane]:
+                sortie.end()
+            if sortie.fault is not None:
+                formation.retire(lane)
+        if all(sortie.fault is not None for sortie in sorties):
+            return
+
+
+def _padded(angles: Array, count: int, simulation: Simulation) -> Array:
+    """Angles of as many ticks; what is missing is of no meaning."""
+    last = angles[-1] if len(angles) else simulation.swashplate
+    return np.concatenate([angles.reshape(-1, *last.shape), np.tile(last, (count - len(angles), 1, 1))])
+
+
+def structure(simulation: Simulation) -> Any:
+    """What flights that are flown side by side have in common."""
+    aircraft, model = simulation.aircraft, simulation.model
+    blades = tuple(rotor.blades for rotor in aircraft.rotors)
+    return (
+        *(blades, aircraft.options, tuple(map(id, aircraft.tables)), simulation.steps_per_tick, simulation.method),
+        *(simulation.tick, simulation.step, model.switches.tobytes()),
+    )
+
+
+def _block(simulation: Simulation, flights: int) -> int:
+    """Ticks of a call that takes no longer than an interruption may wait."""
+    elements = flights * simulation.aircraft.layout.blade_count * simulation.aircraft.options.elements
+    return max(1, min(BLOCK, BLOCK_ELEMENTS // (simulation.steps_per_tick * elements)))

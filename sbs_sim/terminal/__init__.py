@@ -1,0 +1,1 @@
+"""Command lines and progress bars of the executables."""

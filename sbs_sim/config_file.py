@@ -1,28 +1,65 @@
-"""Configuration files: YAML that a JSON schema describes, and what is wrong with one in words."""
+"""Configuration files: where they are, and reading YAML."""
 
-import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from sbs_sim.errors import AircraftError, SbsError
 
-from sbs_sim import checks
-from sbs_sim.errors import SbsError
-
-LARGEST_FILE = 1 << 18  # bytes; an aircraft with 16 rotors has 20 000
-MOST_VALUES = 10_000  # of a file; aliases of aliases make billions of a few lines
-TYPE_WORDS = {
-    "number": "a number",
-    "integer": "a whole number",
-    "string": "a text",
-    "array": "a list",
-    "object": "a mapping of keys to values",
-}
+MAX_FILE_SIZE = 1 << 18  # bytes; an aircraft with 16 rotors has 20 000
 
 
 class UnreadableError(SbsError):
     """A file that is not YAML, or too large for a configuration."""
+
+
+def config_folder() -> Path:
+    """Folder with the configuration files of the package: aircraft, airfoils, joysticks.
+
+    Raises
+    ------
+    AircraftError
+        The package was installed without them.
+    """
+    here = Path(__file__).resolve().parent
+    folders = [here.parent / "config", *(parent / "share/sbs_sim/config" for parent in here.parents)]
+    for folder in folders:
+        if (folder / "aircraft").is_dir():
+            return folder
+    raise AircraftError(f"no folder config/aircraft beside {here.parent} and none under share/sbs_sim above it")
+
+
+def find_file(path_or_name: str | Path, kind: str, suffix: str, folder: Path) -> Path:
+    """Path of a configuration file.
+
+    Parameters
+    ----------
+    path_or_name : str or Path
+        A path, or the name of a file of the package without its suffix.
+    kind : str
+        Folder below config/ with the files of the package.
+    suffix : str
+    folder : Path
+        Where relative paths start.
+
+    Raises
+    ------
+    AircraftError
+        There is no such file: one line with the names of those of the package.
+    """
+    given = Path(path_or_name)
+    for start in (folder, config_folder() / kind):
+        for candidate in (start / given, start / f"{given}{suffix}"):
+            if _is_file(candidate):
+                return candidate
+    known = ", ".join(sorted(path.stem for path in (config_folder() / kind).glob(f"*{suffix}")))
+    raise AircraftError(f"{kind.rstrip('s')} = {str(path_or_name)!r}: allowed are a file's path or one of {known}")
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that no file can have, a folder that may not be entered
+        return False
 
 
 def read_yaml(path: Path) -> Any:
@@ -37,102 +74,11 @@ def read_yaml(path: Path) -> Any:
 
     try:
         with path.open("rb") as file:
-            text = file.read(LARGEST_FILE + 1)
-        if len(text) > LARGEST_FILE:
-            raise UnreadableError(f"the file has more than {LARGEST_FILE} bytes")
+            text = file.read(MAX_FILE_SIZE + 1)
+        if len(text) > MAX_FILE_SIZE:
+            raise UnreadableError(f"the file has more than {MAX_FILE_SIZE} bytes")
         return YAML(typ="safe", pure=True).load(text.decode("utf-8"))
     except UnreadableError:
         raise
-    except Exception as error:  # the parser lets out all kinds: for "!!int x", a 31st of June, deep nesting
+    except Exception as error:  # of many kinds: for "!!int x", a 31st of June, deep nesting
         raise UnreadableError("not readable as YAML: " + " ".join(str(error).split())) from None
-
-
-def problems(data: Any, validator: Any) -> list[str]:
-    """All that is wrong with size, keys, types and plain ranges, each as "path = value: what is allowed".
-
-    Parameters
-    ----------
-    data : object
-        As read from YAML.
-    validator : jsonschema validator
-    """
-    if too_much := _too_much(data):  # before anything goes through all of it
-        return [too_much]
-    errors = sorted(validator.iter_errors(data), key=lambda error: list(map(str, error.path)))
-    # only data that the schema accepts have a structure that is known, in which the search comes to an end
-    found = [_explain(error) for error in errors] or [
-        f"{path} = {value}: allowed is a finite number" for path, value in _not_finite(data, "")
-    ]
-    return list(dict.fromkeys(found))
-
-
-def _too_much(data: Any) -> str:
-    """What to say of more values than any configuration has, or of such as the schema cannot even compare."""
-    try:
-        size = _size(data, {})
-    except RecursionError:
-        return "the file is nested too deeply"
-    except TypeError as error:
-        return str(error)
-    if size <= MOST_VALUES:
-        return ""
-    return f"the file has {size} values, aliases counted as what they stand for: allowed are {MOST_VALUES}"
-
-
-def _size(node: Any, known: dict[int, int]) -> int:
-    """Number of values in nested mappings and lists; what contains itself counts once."""
-    if isinstance(node, Mapping):
-        parts = [*node.keys(), *node.values()]
-    elif isinstance(node, list | tuple | set | frozenset):
-        parts = list(node)
-    elif isinstance(node, complex | np.ndarray):
-        raise TypeError(f"{checks.shown(node)}: allowed are numbers, texts, lists and mappings")
-    else:  # Python cannot even print a number of thousands of digits
-        return 1 + node.bit_length() if isinstance(node, int) else 1
-    if id(node) not in known:
-        known[id(node)] = 0
-        known[id(node)] = 1 + sum(_size(part, known) for part in parts)
-    return known[id(node)]
-
-
-def _not_finite(data: Any, path: str) -> list[tuple[str, float]]:
-    if isinstance(data, dict):
-        return [item for key, value in data.items() for item in _not_finite(value, f"{path}.{key}".lstrip("."))]
-    if isinstance(data, list):
-        return [item for i, value in enumerate(data) for item in _not_finite(value, f"{path}[{i}]")]
-    return [(path, data)] if isinstance(data, float) and not math.isfinite(data) else []
-
-
-def _explain(error: Any) -> str:
-    """One schema error as "path = value: what is allowed"."""
-    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error.absolute_path)
-    path = path.lstrip(".")
-    rule, limit, value = error.validator, error.validator_value, error.instance
-    if rule == "additionalProperties":
-        known = error.schema["properties"]
-        unknown = [_key(key) for key in value if key not in known]
-        where = ", ".join(f"{path}.{key}".lstrip(".") for key in unknown)
-        return f"{where}: unknown key, allowed are {', '.join(known)}"
-    if rule == "dependentRequired":
-        missing = sorted({name for key, names in limit.items() if key in value for name in names if name not in value})
-        return f"{', '.join(f'{path}.{key}'.lstrip('.') for key in missing)}: missing key"
-    if rule == "required":
-        missing = [key for key in limit if key not in value]
-        return f"{', '.join(f'{path}.{key}'.lstrip('.') for key in missing)}: missing key"
-    allowed = {
-        "type": TYPE_WORDS.get(str(limit), f"of type {limit}"),
-        "enum": "one of " + ", ".join(map(str, limit)) if rule == "enum" else "",
-        "minimum": f">= {limit}",
-        "maximum": f"<= {limit}",
-        "exclusiveMinimum": f"> {limit}",
-        "minItems": f"a list of at least {limit}",
-        "minProperties": f"a mapping with at least {limit}",
-        "maxProperties": f"a mapping with at most {limit}",
-        "maxItems": f"a list of at most {limit}",
-        "minLength": "a text that is not empty",
-    }.get(rule, error.message)
-    return f"{path or 'file'} = {checks.shown(value)}: allowed is {allowed}"
-
-
-def _key(key: Any) -> str:
-    return key if isinstance(key, str) and key.isprintable() else checks.shown(key)

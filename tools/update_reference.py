@@ -1,9 +1,10 @@
-"""Write the generated pages of docs/reference anew: topics, services, parameters, commands, modules.
+"""Write the generated pages of docs/reference anew: topics, services, parameters, commands, aircraft files, modules.
 
     ./run python tools/update_reference.py
 
-takes what they say from msg_defs, from the parameters that the nodes declare, from the command lines and from the
-docstrings: what is wrong on a page is wrong there. The pages of single modules are made with the site (make_docs.py).
+takes what they say from msg_defs, from the parameters that the nodes declare, from the command lines, from the
+declared values of aircraft files and from the docstrings: what is wrong on a page is wrong there. The pages of single
+modules are made with the site (make_docs.py).
 """
 
 import argparse
@@ -12,10 +13,13 @@ import importlib
 import itertools
 import re
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+from sbs_sim.aircraft.declaration import Declaration, declarations, leaves
+from sbs_sim.aircraft.description import Description
 from sbs_sim.nodes.endpoints import Endpoint, endpoints, quality
 from sbs_sim.nodes.host import Parameter
 
@@ -322,6 +326,7 @@ frames of its arguments.
 """
 LAYERS = {
     "Library": ("sbs_sim",),
+    "Aircraft": ("sbs_sim.aircraft",),
     "Analysis": ("sbs_sim.analysis",),
     "Recordings": ("sbs_sim.recording",),
     "Pilots": ("sbs_sim.pilot",),
@@ -350,11 +355,71 @@ def api() -> str:
     return page("Python API", *parts)
 
 
+# --- aircraft files ---------------------------------------------------------------------------------------------
+
+AIRCRAFT_TEXT = """
+Every key of an aircraft file, as `sbs_sim/aircraft/description.py` declares it. Range, unit and default are those of
+the file; the unit behind an arrow is that of the attribute in Python. Keys without a default are required. `--set` and
+`Aircraft.with_value` take the same paths; `rotors[0].radius` or `rotors.MR1.radius` is the value of one rotor. The
+symbols are those of the [theory](../theory.md#symbols). [The schema](../../config/aircraft.schema.json) has the same
+ranges for editors. [Make an aircraft file of your own](../howto/own_aircraft.md) shows where to start.
+"""
+HEADINGS = ("key", "symbol", "range", "unit", "default", "in Python", "meaning")
+
+
+def allowed(schema: Mapping[str, Any]) -> str:
+    """What a schema allows, in words."""
+    kind = schema.get("type")
+    if "enum" in schema:
+        return ", ".join(f"`{item}`" for item in schema["enum"])
+    if kind == "string":
+        return "text"
+    if kind == "object":
+        names, inner = list(schema["properties"]), next(iter(schema["properties"].values()))
+        many = "for each of " if len(names) > 1 else ""
+        return f"{many}{', '.join(f'`{name}`' for name in names)}: {allowed(inner)}"
+    if kind == "array":
+        sizes = []
+        while schema["type"] == "array":
+            sizes.append(str(schema["minItems"]))
+            schema = schema["items"]
+        return f"{' × '.join(sizes)} numbers, each {allowed(schema)}"
+    low = f"{schema['minimum']:g}" if "minimum" in schema else f"above {schema['exclusiveMinimum']:g}"
+    return f"{low} to {schema['maximum']:g}{', integer' if kind == 'integer' else ''}"
+
+
+def aircraft_row(path: str, name: str, declaration: Declaration) -> list[str]:
+    """One line of a table."""
+    converted = f" → {declaration.internal_unit}" if declaration.internal_unit != declaration.unit else ""
+    return [
+        f"`{path}`",
+        ", ".join(f"${symbol}$" for symbol in declaration.symbol.split(", ") if symbol),
+        allowed(declaration.schema),
+        f"{declaration.unit}{converted}",
+        "" if declaration.is_required else shown(declaration.default),
+        f"`{name}`",
+        cell(declaration.text),
+    ]
+
+
+def aircraft(record: type = Description) -> str:
+    """docs/reference/aircraft.md."""
+    parts = [AIRCRAFT_TEXT]
+    rows: dict[str, list[list[str]]] = {}
+    for path, name, declaration in leaves(record):
+        rows.setdefault(path.partition(".")[0] if "." in path else "", []).append(aircraft_row(path, name, declaration))
+    for part, declaration in declarations(record).items():
+        if declaration.record:
+            parts += [f"## {part}", f"{declaration.text}.", table(list(HEADINGS), rows[part])]
+    return page("Aircraft files", *parts[:1], table(list(HEADINGS), rows[""]), *parts[1:])
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "topics": topics,
     "services": services,
     "parameters": parameters,
     "commands": commands,
+    "aircraft": aircraft,
     "api": api,
 }
 

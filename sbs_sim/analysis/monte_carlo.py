@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.aircraft_values import unit_of
+from sbs_sim.aircraft.paths import unit_of
 from sbs_sim.analysis.batch import Batch, Case, percentiles
 from sbs_sim.errors import BatchError
 from sbs_sim.flight.trim_point import LIMITS

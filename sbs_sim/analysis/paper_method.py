@@ -14,8 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft import Aircraft, Rotor
-from sbs_sim.aircraft_model import second_moment
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.description import Rotor
+from sbs_sim.aircraft.model_records import second_moment
 from sbs_sim.analysis.differences import used_states
 from sbs_sim.analysis.kinematics import kinematics
 from sbs_sim.analysis.linear_model import settle

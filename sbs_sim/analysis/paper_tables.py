@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from sbs_sim.aircraft import config_folder
+from sbs_sim.config_file import config_folder
 
 Value = complex | float
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.aircraft_values import unit_of
+from sbs_sim.aircraft.paths import unit_of
 from sbs_sim.analysis.export import model_to_dict
 from sbs_sim.analysis.linear_model import LinearModel
 from sbs_sim.analysis.linearize import linearize

@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft import Aircraft, Rotor
-from sbs_sim.aircraft_model import LEAST_DENSITY, second_moment
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.description import Rotor
+from sbs_sim.aircraft.model_records import MIN_DENSITY, second_moment
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.content import ByContent
 from sbs_sim.flight.trim_point import TrimCondition
@@ -96,7 +97,7 @@ class MomentumRotor:
         self.tip_speed, self.area = rotor.speed * rotor.radius, math.pi * rotor.radius**2
         self._axes = model.rotors["axes"][j, :, :, 0]
         self.upward = max(0.0, float(self._axes[2, 2]))
-        self._density = max(aircraft.environment.air_density, LEAST_DENSITY)
+        self._density = max(aircraft.environment.air_density, MIN_DENSITY)
         # thrust is this times the induced velocity times the flow through the disc, eq. (6.1)
         self._mass_flow = self._density * self.area / (2 * rotor.duct_expansion**2)
         chord = 0.5 * (rotor.chord_root + rotor.chord_tip)
@@ -264,7 +265,7 @@ class MomentumTheory:
         """Unknowns of a trim, shape (n,); the parameters are those of `balance`."""
         layout = self._problem.layout
         x = np.zeros(layout.size)
-        if self.aircraft.environment.air_density <= LEAST_DENSITY:
+        if self.aircraft.environment.air_density <= MIN_DENSITY:
             return self._problem.unknowns(0.0, 0.0, np.zeros(len(S.CONTROL_NAMES)), x)
         found = self.balance(condition, share, controls)
         for j, rotor in enumerate(found.rotors):
@@ -296,7 +297,7 @@ class MomentumTheory:
         """Induced velocity that carries the weight in hover [m/s], no more than LARGEST_INFLOW."""
         air = self.aircraft.environment
         area = sum(rotor.area * rotor.upward for rotor in self.rotors)
-        momentum = 2.0 * max(air.air_density, LEAST_DENSITY) * max(area, LEAST_DENSITY)
+        momentum = 2.0 * max(air.air_density, MIN_DENSITY) * max(area, MIN_DENSITY)
         return min(LARGEST_INFLOW, math.sqrt(self.aircraft.body.mass * air.gravity / momentum))
 
     def lift(self, condition: TrimCondition) -> Array:

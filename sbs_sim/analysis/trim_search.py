@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft_model import LEAST_DENSITY
+from sbs_sim.aircraft.model_records import MIN_DENSITY
 from sbs_sim.analysis.newton import newton
 from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import ATTITUDE_UNKNOWNS, BODY_UNKNOWNS, TrimProblem
@@ -283,7 +283,7 @@ class _Search:
 
     def _missing(self) -> list[str]:
         """What the aircraft has not got: air, or controls that set lift and moments apart from each other."""
-        if self._problem.aircraft.environment.air_density < LEAST_DENSITY:
+        if self._problem.aircraft.environment.air_density < MIN_DENSITY:
             return ["there is no air to carry the weight"]
         effects, sizes, _ = np.linalg.svd(self._theory.balance(self._condition).authority)
         if sizes[-1] > NO_AUTHORITY * sizes[0]:

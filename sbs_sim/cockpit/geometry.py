@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft import Aircraft, Rotor
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.description import Rotor
 from sbs_sim.content import ByContent
 from sbs_sim.model.frames import hub_axes
 from sbs_sim.model.multiblade import blade_matrix

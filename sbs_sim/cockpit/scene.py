@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from viser import ViserServer
 from viser.transforms import SO3
 
-from sbs_sim.aircraft import Aircraft, Rotor
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.description import Rotor
 from sbs_sim.cockpit import geometry
 from sbs_sim.flight.records import Snapshot
 from sbs_sim.model import records as R

@@ -62,7 +62,7 @@ def _print_completion() -> int:
     """What a shell evaluates to complete: the file may be anywhere."""
     import shlex
 
-    from sbs_sim.aircraft import config_folder
+    from sbs_sim.config_file import config_folder
 
     print(f"source {shlex.quote(str(config_folder() / 'completion.bash'))}")
     return 0

@@ -15,7 +15,8 @@ from sbs_sim.model.packing import lane_count
 from sbs_sim.model.records import LOAD_SIZE, Exponential, make_exponential
 
 if TYPE_CHECKING:
-    from sbs_sim.aircraft import Aircraft, Rotor
+    from sbs_sim.aircraft import Aircraft
+    from sbs_sim.aircraft.description import Rotor
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft import Aircraft, Rotor
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.description import Rotor
 from sbs_sim.model import working_state as W
 
 Array = NDArray[np.float64]

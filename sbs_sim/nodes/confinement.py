@@ -8,7 +8,7 @@ from pathlib import Path
 
 import rclpy.utilities
 
-from sbs_sim.aircraft import config_folder
+from sbs_sim.config_file import config_folder
 from sbs_sim.errors import SbsError
 
 # Where Fast DDS finds its profile. Version 2 (until Jazzy) knows the old name alone, version 3 (from Kilted on) the new

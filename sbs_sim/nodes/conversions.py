@@ -36,7 +36,8 @@ from sbs_msgs.msg import (
 )
 from sbs_msgs.msg import Wind as WindMessage
 from sbs_msgs.srv import SetWind
-from sbs_sim.aircraft import Aircraft, Rotor
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.description import Rotor
 from sbs_sim.analysis import linearize, modes, sweep, trim
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight import validity

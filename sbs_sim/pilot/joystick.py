@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim import checks, config_file
-from sbs_sim.aircraft import config_folder
+from sbs_sim import checks, config_file, validation
+from sbs_sim.config_file import config_folder
 from sbs_sim.content import ByContent
 from sbs_sim.errors import PilotError
 from sbs_sim.model.state import CONTROL_NAMES
@@ -61,7 +61,7 @@ class JoystickFile(ByContent):
             if not os.path.isfile(place):  # no too for names that no file can have
                 raise PilotError("there is no such file")
             data = config_file.read_yaml(place)
-            if found := config_file.problems(data, _validator()):
+            if found := validation.problems(data, _validator()):
                 raise PilotError("; ".join(found))
             checks.choice("pad", pad, data["pads"], PilotError)
         except (PilotError, config_file.UnreadableError) as error:

@@ -15,8 +15,9 @@ from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
 from sbs_sim import Aircraft, simulate, trim
-from sbs_sim.aircraft import Rotor, config_folder
-from sbs_sim.aircraft_values import unit_of
+from sbs_sim.aircraft.description import Rotor
+from sbs_sim.aircraft.paths import unit_of
+from sbs_sim.config_file import config_folder
 from sbs_sim.errors import AircraftError
 from sbs_sim.model.state import CONTROL_NAMES, RATES, VELOCITY
 
@@ -338,21 +339,6 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
     assert flattened(aircraft) != everything
     if not NOT_IN_THE_MODEL & set(path):
         assert model_arrays(aircraft) != arrays
-
-
-def test_the_schema_has_a_key_for_every_field_of_a_rotor():
-    keys = set(SCHEMA["properties"]["rotors"]["items"]["properties"])
-    fields = {field.name for field in dataclasses.fields(Rotor)}
-    nested = {
-        "chord_root": "chord",
-        "chord_tip": "chord",
-        "twist_root": "twist_deg",
-        "twist_tip": "twist_deg",
-    }
-    named = {
-        nested.get(name) or next(key for key in (name, f"{name}_deg", f"{name}_rpm") if key in keys) for name in fields
-    }
-    assert named == keys
 
 
 def test_every_key_is_demanded_but_the_description_factors_of_mixing_speed_of_sound_and_interpolation():
@@ -859,7 +845,7 @@ def test_units_of_values(path, unit):
     [("body.mass", 25.0), ("rotors.blade_mass", 0.2), ("rotors.radius", 0.55), ("rotors[1].chord.tip", 0.04)],
 )
 def test_an_airfoil_that_stays_the_same_is_not_read_again(sbs, monkeypatch, path, value):
-    monkeypatch.setattr("sbs_sim.aircraft.read_table", None)
+    monkeypatch.setattr("sbs_sim.aircraft.airfoils.read_table", None)
     assert sbs.with_value(path, value).airfoils["naca0012"] is sbs.airfoils["naca0012"]
 
 

@@ -113,7 +113,7 @@ def test_what_needs_ros_says_so_in_one_line(environment):
 
 def test_everything_that_is_shipped_is_found_there(environment):
     code = (
-        "import sbs_sim, sys; from sbs_sim.aircraft import config_folder; place = config_folder();"
+        "import sbs_sim, sys; from sbs_sim.config_file import config_folder; place = config_folder();"
         "print(place); print(sbs_sim.__file__); [sbs_sim.Aircraft.load(name) for name in ('sbs', 'sbs_paper')];"
         "print('rclpy' in sys.modules, len(list(place.rglob('*.*'))))"
     )

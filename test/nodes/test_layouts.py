@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from sbs_sim.aircraft import config_folder
+from sbs_sim.config_file import config_folder
 from sbs_sim.recording import read
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -621,7 +621,7 @@ def test_controls_message_names_the_pilot_controls():
 def test_nodes_yaml_holds_the_defaults_of_every_parameter():
     from ruamel.yaml import YAML
 
-    from sbs_sim.aircraft import config_folder
+    from sbs_sim.config_file import config_folder
     from sbs_sim.nodes import analysis, control_mixer, hover_hold, joystick, simulator, teleop
 
     written = YAML(typ="safe").load((config_folder() / "nodes.yaml").read_text())

@@ -8,7 +8,7 @@ import pytest
 from helpers import aircraft_data
 
 from sbs_sim import Aircraft, linearize, simulate
-from sbs_sim.aircraft import config_folder
+from sbs_sim.config_file import config_folder
 from sbs_sim.errors import PilotError
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import state as S

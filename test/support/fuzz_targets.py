@@ -26,10 +26,11 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from sbs_sim import Aircraft, LinearModel, Simulation, linearize, simulate, sweep, trim
-from sbs_sim.aircraft import config_folder
+from sbs_sim.config_file import config_folder
 from sbs_sim.analysis.batch import Case, simulate_batch
 from sbs_sim.analysis.monte_carlo import gust_cases
 from sbs_sim.cockpit.playback import Recording
+from sbs_sim.config_file import config_folder
 from sbs_sim.errors import SbsError
 from sbs_sim.flight.mixer import Mixer
 from sbs_sim.flight.trim_point import TrimPoint

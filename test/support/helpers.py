@@ -6,7 +6,8 @@ import functools
 import numba
 import numpy as np
 
-from sbs_sim.aircraft import Aircraft, config_folder
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.config_file import config_folder
 from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.rotor_matrices import arranged, rotor_matrices
 from sbs_sim.lanes import as_lanes, as_records

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.aircraft.declaration import model_values
+from sbs_sim.aircraft.description import Rotor
 from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells
 from sbs_sim.model.elementary import cosine_and_sine
@@ -13,10 +15,10 @@ from sbs_sim.model.frames import hub_axes
 from sbs_sim.model.state import harmonic_count
 
 if TYPE_CHECKING:
-    from sbs_sim.aircraft import Aircraft, Rotor
+    from sbs_sim.aircraft import Aircraft
 
 Array = NDArray[np.float64]
-LEAST_DENSITY = 1e-12  # kg/m^3, less than at 300 km: a vacuum
+MIN_DENSITY = 1e-12  # kg/m^3, less than at 300 km: below it is vacuum
 
 
 def model_of(aircraft: "Aircraft") -> R.Model:
@@ -93,13 +95,8 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
 
 def _air(aircraft: "Aircraft") -> NDArray[Any]:
     air, environment = R.records(R.AIR, 1, 1), aircraft.environment
-    values = {
-        "density": environment.air_density,
-        "inverse_viscosity": 1.0 / environment.kinematic_viscosity,
-        "gravity": environment.gravity,
-        "plate_areas": aircraft.body.flat_plate_areas,
-    }
-    _set(air[0], values)
+    values = {**model_values(environment, R.AIR), **model_values(aircraft.body, R.AIR)}
+    _set(air[0], values | {"inverse_viscosity": 1.0 / environment.kinematic_viscosity})
     return air
 
 
@@ -111,39 +108,28 @@ def _body(aircraft: "Aircraft") -> NDArray[Any]:
     return body
 
 
-def second_moment(aircraft: "Aircraft", rotor: "Rotor") -> float:
+def second_moment(aircraft: "Aircraft", rotor: Rotor) -> float:
     """A_1 in the equations of a blade [kg m^2]."""
-    whole = aircraft.options.flap_inertia == "axis_to_tip"
-    return rotor.blade_mass * (rotor.radius * rotor.radius) / 3 if whole else rotor.second_moment
+    to_axis = aircraft.options.flap_inertia == "axis_to_tip"
+    return rotor.blade_mass * (rotor.radius * rotor.radius) / 3 if to_axis else rotor.second_moment
 
 
 def _blade_values(
-    aircraft: "Aircraft", rotor: "Rotor", number: int, airfoil: AirfoilTable, first_row: int
+    aircraft: "Aircraft", rotor: Rotor, number: int, airfoil: AirfoilTable, first_row: int
 ) -> dict[str, Any]:
-    """Values of a blade but for the whole numbers."""
+    """Values of a blade, without the integers."""
     columns, first_angle, inverse_step = cell_grid(airfoil)
     cos_phase, sin_phase = cosine_and_sine(rotor.swashplate_phase)
     cos_place, sin_place = cosine_and_sine(2.0 * math.pi * number / rotor.blades)
     inertia = second_moment(aircraft, rotor)
     return {
-        "speed": rotor.speed,
-        "sense": rotor.rotation,
-        "radius": rotor.radius,
-        "hub": rotor.hub,
+        **model_values(rotor, R.BLADE),
         "axes": hub_axes(rotor.shaft_direction),
-        "hinge": rotor.hinge_offset,
         "lag_hinge": rotor.hinge_offset - rotor.flap_hinge_offset,
-        "flap_hinge": rotor.flap_hinge_offset,
-        "mass": rotor.blade_mass,
         "first": rotor.first_moment,
         "second": inertia,
         "second_hub": rotor.second_moment,
         "inverse_second": 1.0 / inertia,
-        "flap_spring": rotor.flap_spring,
-        "lag_spring": rotor.lag_spring,
-        "lag_damping": rotor.lag_damping,
-        "pitch_flap": rotor.pitch_flap_coupling,
-        "pitch_lag": rotor.pitch_lag_coupling,
         "cos_phase": cos_phase,
         "sin_phase": sin_phase,
         "cos_place": cos_place,
@@ -170,18 +156,14 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
         # in vacuum the coefficients are zero, not zero over zero
         pressure = density * math.pi * (rotor.radius * rotor.radius) * (tip_speed * tip_speed)
         values = {
-            "speed": rotor.speed,
-            "radius": rotor.radius,
-            "sense": rotor.rotation,
-            "hub": rotor.hub,
+            **model_values(rotor, R.ROTOR),
             "axes": hub_axes(rotor.shaft_direction),
-            "duct": rotor.duct_expansion,
             "inverse_tip_speed": 1.0 / tip_speed,
-            "load_scale": 1.0 / pressure if density > LEAST_DENSITY else 0.0,
+            "load_scale": 1.0 / pressure if density > MIN_DENSITY else 0.0,
             "inverse_blades": 1.0 / rotor.blades,
         }
         _set(rotors[j], values)
-        whole = {
+        integers = {
             "blades": rotor.blades,
             "harmonics": harmonic_count(rotor.blades),
             "first_quad": quads[j],
@@ -192,7 +174,7 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
             "lag_rate": layout.lag_rate(j).start,
             "inflow": layout.inflow(j).start,
         }
-        for name, value in whole.items():
+        for name, value in integers.items():
             rotors[j][name] = value
     return rotors
 

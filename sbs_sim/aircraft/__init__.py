@@ -1,0 +1,357 @@
+"""Aircraft: files of YAML, checked, as frozen dataclasses, and as the records of the compiled model.
+
+`sbs_sim.aircraft.description` declares the values of a file; `sbs_sim.aircraft.declaration` tells how to add one.
+"""
+
+from __future__ import annotations  # `help` then shows types by their names
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sbs_sim import checks, config_file, validation
+from sbs_sim.aircraft.airfoils import load_tables
+from sbs_sim.aircraft.consistency import consistency_problems
+from sbs_sim.aircraft.declaration import cached_by_class, declarations, schema_of, values_of
+from sbs_sim.aircraft.description import Array, Description, Rotor
+from sbs_sim.aircraft.model_records import model_of, with_fidelity
+from sbs_sim.aircraft.paths import Location, check_path, locations, mirrored, replaced, separate, value_at
+from sbs_sim.content import same
+from sbs_sim.errors import AircraftError
+from sbs_sim.model.airfoil import AirfoilTable, stall_angles
+from sbs_sim.model.frames import ONE, hub_axes
+from sbs_sim.model.mixing import mixed
+from sbs_sim.model.packing import by_blades, lane_count, side_by_side
+from sbs_sim.model.records import Model
+from sbs_sim.model.state import StateLayout
+
+MAX_CHANGES_SHOWN = 5  # in a refusal
+
+
+@dataclass(frozen=True, eq=False)
+class Aircraft(Description):
+    """An aircraft as its file describes it, checked.
+
+    Attributes
+    ----------
+    name, description : str
+    environment : Environment
+    body : Body
+    options : Options
+    control_ranges : dict of str to (float, float)
+        Range of each pilot control [rad].
+    rotors : tuple of Rotor
+    tables : tuple of AirfoilTable
+        Section data of each rotor's blades; one object for rotors that have the same.
+    data : dict
+        The mapping of the file, with its keys and units; not to be changed.
+    folder : Path
+        Where relative paths of airfoils start.
+    """
+
+    tables: tuple[AirfoilTable, ...] = field(repr=False, kw_only=True)
+    data: dict[str, Any] = field(repr=False, compare=False, kw_only=True)
+    folder: Path = field(repr=False, compare=False, kw_only=True)
+
+    @classmethod
+    def load(cls, path_or_name: str | Path) -> Aircraft:
+        """Read an aircraft file.
+
+        Parameters
+        ----------
+        path_or_name : str or Path
+            A path, or the name of a file in config/aircraft ("sbs").
+
+        Raises
+        ------
+        AircraftError
+            One line that names the file and every wrong key with its value and what is allowed.
+        """
+        checks.path("aircraft", path_or_name, AircraftError)
+        path = config_file.find_file(path_or_name, "aircraft", ".yaml", Path())
+        try:
+            return cls.from_dict(config_file.read_yaml(path), path.parent)
+        except (AircraftError, config_file.UnreadableError) as error:
+            raise AircraftError(f"{path}: {error}") from None
+
+    @classmethod
+    def from_dict(cls, data: Any, folder: Path | None = None) -> Aircraft:
+        """Aircraft of a mapping with the keys of an aircraft file.
+
+        Parameters
+        ----------
+        data : dict
+            As read from YAML.
+        folder : Path, optional
+            Where relative paths of airfoils start; the current folder if not given.
+
+        Raises
+        ------
+        AircraftError
+            See `load`.
+        """
+        return cls._made_of(data, Path.cwd() if folder is None else checks.path("folder", folder, AircraftError))
+
+    @classmethod
+    def _made_of(cls, data: Any, folder: Path, similar: Aircraft | None = None) -> Aircraft:
+        """Checked aircraft of a mapping; airfoil tables that a similar aircraft has are not read again."""
+        if problems := validation.problems(data, _validator(cls)):
+            raise AircraftError("; ".join(problems))
+        data = separate(data)
+        values = values_of(cls, data)
+        known = (similar.rotors, similar.tables) if similar else ((), ())
+        tables = load_tables(values["rotors"], folder, *known)
+        aircraft = cls(**values, tables=tables, data=data, folder=folder.absolute())
+        if problems := consistency_problems(aircraft):
+            raise AircraftError("; ".join(problems))
+        return aircraft
+
+    def value(self, path: str) -> Any:
+        """Value of the file at a path, see `with_value`; a list where the path stands for that of every rotor.
+
+        Raises
+        ------
+        AircraftError
+            A path that does not exist.
+        """
+        found = [value_at(self.data, location) for location in locations(self.data, schema_of(type(self)), path)]
+        return found[0] if len(found) == 1 else found
+
+    def with_value(self, path: str, value: Any) -> Aircraft:
+        """Aircraft with one value of its file changed.
+
+        Parameters
+        ----------
+        path : str
+            Keys of the file with dots between them, indices of lists in brackets: "body.mass", "body.inertia[0][0]".
+            "rotors.blade_mass" is that of every rotor, "rotors[0].blade_mass" or "rotors.MR1.blade_mass" that of one.
+        value : number, str or list
+            What the file would hold there, in its units.
+
+        Raises
+        ------
+        AircraftError
+            A path that does not exist, or a value with which the aircraft is not possible: one line that names path,
+            value and what is allowed.
+        """
+        check_path(path)
+        return self.with_values({path: value})
+
+    def with_values(self, values: Mapping[str, Any]) -> Aircraft:
+        """Aircraft with several values of its file changed, which are checked together and not one after the other.
+
+        Parameters
+        ----------
+        values : mapping of str to value
+            Paths and values as for `with_value`. Where two paths stand for one value the later one counts:
+            {"rotors.radius": 0.4, "rotors.MR1.radius": 0.5}. An element of the inertia off the diagonal sets the
+            symmetric one, too: "body.inertia[0][1]" is "body.inertia[1][0]".
+
+        Raises
+        ------
+        AircraftError
+            See `with_value`; or different values for two symmetric elements of the inertia.
+        """
+        checks.instance("values", values, Mapping, AircraftError)
+        plain = {path: _python(value) for path, value in values.items()}
+        data, pairs = self.data, dict[Location, tuple[str, Any]]()
+        for path, value in plain.items():
+            for location in locations(data, schema_of(type(self)), path):
+                for one in (location, mirrored(location)):
+                    data = replaced(data, one, value)
+                _check_pair(pairs, location, path, value)
+        try:
+            return self._made_of(data, self.folder, self)
+        except AircraftError as error:
+            raise AircraftError(_with_changes(plain, str(error))) from None
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.parameter_hash))
+
+    @property
+    def airfoils(self) -> dict[str, AirfoilTable]:
+        """Section data by the names in the file; of an extended airfoil the table of its first rotor."""
+        pairs = zip(self.rotors, self.tables, strict=True)
+        return {rotor.airfoil: table for rotor, table in reversed(list(pairs))}
+
+    @cached_property
+    def layout(self) -> StateLayout:
+        """Indices and names of the states of this aircraft."""
+        return StateLayout(tuple(rotor.blades for rotor in self.rotors))
+
+    @cached_property
+    def parameter_hash(self) -> str:
+        """SHA-256 over everything that the model takes from the aircraft file: equal for equal physics.
+
+        It covers the values in SI units, not the records of the compiled model, so that it is the same in other
+        versions of this package. A value that has the default of its declaration is left out: values that are added
+        to the declarations later do not change the hash of older files.
+        """
+        digest = hashlib.sha256()
+        for part in (self.environment, self.body, self.options, *self.rotors):
+            for name, declaration in declarations(type(part)).items():
+                value = getattr(part, name)
+                if declaration.is_physics and not same(value, declaration.internal_default):
+                    _digest(digest, name, value)
+        for table in self.tables:
+            for name in ("reynolds", "alpha", "cl", "cd"):
+                _digest(digest, name, getattr(table, name))
+        return digest.hexdigest()
+
+    def files(self) -> tuple[dict[str, Any], dict[str, bytes]]:
+        """Mapping of this aircraft, which names airfoils by file, and the contents of those files by name.
+
+        Raises
+        ------
+        AircraftError
+            An airfoil's file does not exist any more.
+        """
+        data, contents, names = separate(self.data), {}, {}
+        for i, airfoil in enumerate(sorted(self.airfoils)):
+            names[airfoil] = f"{i}_{Path(airfoil).stem}.csv"
+            contents[names[airfoil]] = config_file.find_file(airfoil, "airfoils", ".csv", self.folder).read_bytes()
+        for entry in data["rotors"]:
+            entry["airfoil"] = names[entry["airfoil"]]
+        return data, contents
+
+    def mix(self, controls: ArrayLike) -> Array:
+        """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls [rad], shape (4,)."""
+        angles = np.empty((3 * len(self.rotors), 1))
+        mixed(self.mixing, np.asarray(controls, dtype=float).reshape(-1, 1), ONE, angles)
+        return angles.reshape(-1, 3)
+
+    @cached_property
+    def mixing(self) -> Array:
+        """Swashplate angles of all rotors over the pilot controls, shape (3 n_rotors, 4)."""
+        return np.concatenate([rotor.mixing for rotor in self.rotors])
+
+    def unmix(self, angles: Array) -> Array:
+        """Pilot controls [rad], shape (4,), whose mixture is nearest to swashplate angles [rad], (n_rotors, 3)."""
+        return np.asarray(np.linalg.lstsq(self.mixing, np.ravel(angles), rcond=None)[0], dtype=np.float64)
+
+    def fuselage(self) -> tuple[float, Array, Array]:
+        """Mass [kg], first moment [kg m] and inertia [kg m^2] about the c.g. of the aircraft without blades.
+
+        The printed totals minus the blades, undeflected and averaged over azimuth (theory.md section 5); the c.g. of
+        the whole stays at the origin, so the fuselage has the first moment that balances the blades.
+        """
+        mass = self.body.mass
+        first = np.zeros(3)
+        inertia = self.body.inertia.copy()
+        for rotor in self.rotors:
+            blades = rotor.blades * rotor.blade_mass
+            mass -= blades
+            first -= blades * rotor.hub
+            inertia -= _blades_inertia(rotor)
+        return mass, first, inertia
+
+    def model(self, lead_lag: bool = True, cyclic_inflow: bool = True) -> Model:
+        """Records of the compiled model with the given fidelity (theory.md section 7), with a single lane everywhere.
+
+        Parameters
+        ----------
+        lead_lag : bool
+            False holds the blades at zero lag.
+        cyclic_inflow : bool
+            False holds lambdas and lambdac at zero.
+
+        Returns
+        -------
+        Model
+            Shared with other callers: read only. `sbs_sim.model.packing` arranges it for the processor.
+        """
+        return with_fidelity(self._model, lead_lag, cyclic_inflow)
+
+    def arranged(self, lead_lag: bool, cyclic_inflow: bool, lanes: str) -> Model:
+        """`model` with its blades in the lanes (lanes = "blades"), or copies of it ("points"); read only."""
+        key = lead_lag, cyclic_inflow, lanes
+        if key not in self._arrangements:
+            model, count = self.model(lead_lag, cyclic_inflow), lane_count()
+            made = by_blades(model, count) if lanes == "blades" else side_by_side([model] * count)
+            self._arrangements[key] = made
+        return self._arrangements[key]
+
+    @cached_property
+    def _arrangements(self) -> dict[tuple[bool, bool, str], Model]:
+        return {}
+
+    @cached_property
+    def kept(self) -> dict[Any, Any]:
+        """Cache of derived results: rotors by momentum theory, hovers that trims start from, matrices of `etd`."""
+        return {}
+
+    @cached_property
+    def _model(self) -> Model:
+        return model_of(self)
+
+    @cached_property
+    def stall_table(self) -> Array:
+        """Reynolds numbers and stall angles of every rotor as `working_state` takes them, shape (n_rotors, 3, n)."""
+        size = max(len(table.reynolds) for table in self.tables)
+        return np.array(
+            [
+                np.pad((table.reynolds, *stall_angles(table)), ((0, 0), (0, size - len(table.reynolds))), "edge")
+                for table in self.tables
+            ]
+        )
+
+
+@cached_by_class
+def _validator(record: type) -> Any:
+    """JSON schema validator of files with the declared values of a dataclass."""
+    from jsonschema import Draft202012Validator  # here, because it is slow to import and needed once
+
+    return Draft202012Validator(schema_of(record))
+
+
+def _python(value: Any) -> Any:
+    """A value as YAML gives it."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+
+
+def _check_pair(pairs: dict[Location, tuple[str, Any]], location: Location, path: str, value: Any) -> None:
+    """Raise AircraftError if the symmetric element was given another value; keep this one."""
+    across = mirrored(location)
+    if across == location:
+        return
+    other, given = pairs.get(across, (path, value))
+    if given != value and other != path:
+        both = f"{other} = {checks.shown(given)}, {path} = {checks.shown(value)}"
+        raise AircraftError(f"{both}: allowed is one value, the inertia is symmetric")
+    pairs[location] = path, value
+
+
+def _with_changes(values: Mapping[str, Any], error: str) -> str:
+    """Fault of a changed aircraft with the changes before it, where it does not name the only change itself."""
+    named = [path for path in values if error.startswith(f"{path} = ")]
+    if named and len(values) == 1:
+        return error
+    changes = ", ".join(f"{path} = {checks.shown(value)}" for path, value in list(values.items())[:MAX_CHANGES_SHOWN])
+    more = f" and {len(values) - MAX_CHANGES_SHOWN} more" if len(values) > MAX_CHANGES_SHOWN else ""
+    return f"{changes}{more}: {error}"
+
+
+def _digest(digest: Any, name: str, value: Any) -> None:
+    """Add a named number, text or array to a digest; integers count as floats."""
+    if isinstance(value, str):
+        digest.update(f"{name}={value};".encode())
+        return
+    values = np.ascontiguousarray(value, dtype=np.float64) + 0.0  # there is one zero
+    digest.update(f"{name}{values.shape}".encode() + values.tobytes())
+
+
+def _blades_inertia(rotor: Rotor) -> Array:
+    """Inertia about the c.g. of a rotor's undeflected blades, averaged over azimuth [kg m^2], shape (3, 3)."""
+    e0 = rotor.hinge_offset
+    polar = rotor.blades * (rotor.blade_mass * (e0 * e0) + 2 * e0 * rotor.first_moment + rotor.second_moment)
+    axes = hub_axes(rotor.shaft_direction)
+    about_hub = polar / 2 * (np.eye(3) + np.outer(axes[:, 2], axes[:, 2]))
+    hub, mass = rotor.hub, rotor.blades * rotor.blade_mass
+    distance = hub[0] * hub[0] + hub[1] * hub[1] + hub[2] * hub[2]
+    return np.asarray(about_hub + mass * (distance * np.eye(3) - np.outer(hub, hub)))

@@ -26,7 +26,6 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from sbs_sim import Aircraft, LinearModel, Simulation, linearize, simulate, sweep, trim
-from sbs_sim.config_file import config_folder
 from sbs_sim.analysis.batch import Case, simulate_batch
 from sbs_sim.analysis.monte_carlo import gust_cases
 from sbs_sim.cockpit.playback import Recording

@@ -130,16 +130,16 @@ class Rotor(ByContent):
     rotation: int = choice(
         "Sense of rotation, +1 counter-clockwise seen from above", (1, -1), symbol="G", model_field="sense"
     )
-    speed: float = number("Rotor speed", 1, 100000, "rpm", symbol=r"\Omega", model_field="speed")
+    speed: float = number("Rotor speed", 1, 100000, "rpm", symbol=r"\Omega", model_field="rotor_speed")
     radius: float = number("Rotor radius", 0.01, 50, "m", symbol="R", model_field="radius")
     blades: int = integer("Number of blades", 3, 20, symbol="N_b")
     blade_mass: float = number("Mass of a blade", 1e-12, 1e4, "kg", symbol="m_b", model_field="mass")
     blade_cg: float = number("Distance of a blade's c.g. from the flap hinge", 1e-12, 50, "m", symbol="r_G")
     hinge_offset: float = number(
-        "Distance of the flap hinge from the axis", 0, 50, "m", symbol="e_0", model_field="hinge"
+        "Distance of the flap hinge from the axis", 0, 50, "m", symbol="e_0", model_field="hinge_offset"
     )
     flap_hinge_offset: float = number(
-        "Distance of the flap hinge from the lag hinge", 0, 50, "m", symbol="e_F", model_field="flap_hinge"
+        "Distance of the flap hinge from the lag hinge", 0, 50, "m", symbol="e_F", model_field="flap_hinge_offset"
     )
     flap_spring: float = number(
         "Stiffness of the flap hinge", 0, 1e9, "N m/rad", symbol=r"K_\beta", model_field="flap_spring"
@@ -151,10 +151,10 @@ class Rotor(ByContent):
         "Damping of the lag hinge", 0, 1e9, "N m s/rad", symbol=r"C_\xi", model_field="lag_damping"
     )
     pitch_flap_coupling: float = number(
-        "Blade pitch taken off per flap angle", -10, 10, "rad/rad", symbol=r"K_{t\beta}", model_field="pitch_flap"
+        "Blade pitch taken off per flap angle", -10, 10, "rad/rad", symbol=r"K_{t\beta}", model_field="pitch_flap_coupling"
     )
     pitch_lag_coupling: float = number(
-        "Blade pitch taken off per lag angle", -10, 10, "rad/rad", symbol=r"K_{t\xi}", model_field="pitch_lag"
+        "Blade pitch taken off per lag angle", -10, 10, "rad/rad", symbol=r"K_{t\xi}", model_field="pitch_lag_coupling"
     )
     chord_root: float = number(
         "Chord at the flap hinge, linear to the tip", 1e-12, 10, "m", key="chord.root", symbol="c"
@@ -171,7 +171,7 @@ class Rotor(ByContent):
     swashplate_phase: float = number("Phase of the swashplate against the blades", -360, 360, "deg", symbol=r"\psi_s")
     airfoil: str = string("Airfoil table: a name in config/airfoils, or a path", is_physics=False)  # its table counts
     duct_expansion: float = number(
-        "Wake expansion ratio of the duct; 0.5 is an open rotor", 0.25, 2, symbol="a_w", model_field="duct"
+        "Wake expansion ratio of the duct; 0.5 is an open rotor", 0.25, 2, symbol="a_w", model_field="duct_expansion"
     )
     collective_range: Range = interval("Range of the collective of the swashplate", -90, 90, "deg", is_physics=False)
     cyclic_range: Range = interval("Range of each cyclic of the swashplate", -90, 90, "deg", is_physics=False)

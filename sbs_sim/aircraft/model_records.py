@@ -37,7 +37,7 @@ def model_of(aircraft: "Aircraft") -> R.Model:
         airfoil = aircraft.tables[j]
         for k in range(rotor.blades):
             _set(blades[number], _blade_values(aircraft, rotor, k, airfoil, first_rows[airfoil]))
-            blades[number]["quad"], blades[number]["begins"] = quads[j] + k // R.QUAD, k % R.QUAD == 0
+            blades[number]["quad"], blades[number]["starts_quad"] = quads[j] + k // R.QUAD, k % R.QUAD == 0
             blades[number]["elements"], blades[number]["harmonics"] = j, harmonic_count(rotor.blades)
             inner = airfoil.reynolds[1:-1]
             knots[number, :, 0] = np.concatenate([inner, np.full(most - len(inner), np.inf)])
@@ -48,7 +48,7 @@ def model_of(aircraft: "Aircraft") -> R.Model:
         body=_body(aircraft),
         rotors=_rotors(aircraft, quads),
         blades=blades,
-        places=_places(aircraft, quads),
+        indices=_state_indices(aircraft, quads),
         elements=_elements(aircraft),
         knots=knots,
         table=table,
@@ -65,18 +65,18 @@ def _stall(aircraft: "Aircraft") -> Array:
 
 def with_fidelity(model: R.Model, lead_lag: bool, cyclic_inflow: bool) -> R.Model:
     """Model in which blades lag or not, and the inflow has its cyclic parts or not."""
-    switches, blades, places = model.switches.copy(), model.blades, model.places
+    switches, blades, indices = model.switches.copy(), model.blades, model.indices
     switches["lead_lag"], switches["cyclic_inflow"] = lead_lag, cyclic_inflow
-    zero = R.state_size(model)  # its place behind the state
+    zero = R.state_size(model)  # its index behind the state
     if not lead_lag:
         blades = R.aligned(blades.shape, blades.dtype)
         blades[:] = model.blades
         blades["lead_lag"] = 0.0
-        places = places._replace(lag=np.full_like(places.lag, zero), lag_rate=np.full_like(places.lag_rate, zero))
+        indices = indices._replace(lag=np.full_like(indices.lag, zero), lag_rate=np.full_like(indices.lag_rate, zero))
     if not cyclic_inflow:
-        places = places._replace(inflow=places.inflow.copy())
-        places.inflow[1:] = zero
-    return model._replace(switches=switches, blades=blades, places=places)
+        indices = indices._replace(inflow=indices.inflow.copy())
+        indices.inflow[1:] = zero
+    return model._replace(switches=switches, blades=blades, indices=indices)
 
 
 def _set(record: Any, values: dict[str, Any]) -> None:
@@ -120,28 +120,28 @@ def _blade_values(
     """Values of a blade, without the integers."""
     columns, first_angle, inverse_step = cell_grid(airfoil)
     cos_phase, sin_phase = cosine_and_sine(rotor.swashplate_phase)
-    cos_place, sin_place = cosine_and_sine(2.0 * math.pi * number / rotor.blades)
+    cos_azimuth_offset, sin_azimuth_offset = cosine_and_sine(2.0 * math.pi * number / rotor.blades)
     inertia = second_moment(aircraft, rotor)
     return {
         **model_values(rotor, R.BLADE),
         "axes": hub_axes(rotor.shaft_direction),
-        "lag_hinge": rotor.hinge_offset - rotor.flap_hinge_offset,
-        "first": rotor.first_moment,
-        "second": inertia,
-        "second_hub": rotor.second_moment,
-        "inverse_second": 1.0 / inertia,
+        "lag_hinge_offset": rotor.hinge_offset - rotor.flap_hinge_offset,
+        "first_moment": rotor.first_moment,
+        "second_moment": inertia,
+        "hub_second_moment": rotor.second_moment,
+        "inverse_second_moment": 1.0 / inertia,
         "cos_phase": cos_phase,
         "sin_phase": sin_phase,
-        "cos_place": cos_place,
-        "sin_place": sin_place,
+        "cos_azimuth_offset": cos_azimuth_offset,
+        "sin_azimuth_offset": sin_azimuth_offset,
         "alternation": (1.0 - 2.0 * (number % 2)) if rotor.blades % 2 == 0 else 0.0,
         "lead_lag": 1.0,
-        "first_angle": first_angle,
-        "inverse_step": inverse_step,
-        "columns": columns,
+        "first_alpha": first_angle,
+        "inverse_alpha_step": inverse_step,
+        "alpha_cells": columns,
         "first_row": first_row,
-        "least_reynolds": airfoil.reynolds[0],
-        "largest_reynolds": airfoil.reynolds[-1],
+        "min_reynolds": airfoil.reynolds[0],
+        "max_reynolds": airfoil.reynolds[-1],
     }
 
 
@@ -159,7 +159,7 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
             **model_values(rotor, R.ROTOR),
             "axes": hub_axes(rotor.shaft_direction),
             "inverse_tip_speed": 1.0 / tip_speed,
-            "load_scale": 1.0 / pressure if density > MIN_DENSITY else 0.0,
+            "coefficient_scale": 1.0 / pressure if density > MIN_DENSITY else 0.0,
             "inverse_blades": 1.0 / rotor.blades,
         }
         _set(rotors[j], values)
@@ -179,8 +179,8 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
     return rotors
 
 
-def _places(aircraft: "Aircraft", quads: NDArray[np.int64]) -> R.Places:
-    """See `Places`; the zero stands behind the state."""
+def _state_indices(aircraft: "Aircraft", quads: NDArray[np.int64]) -> R.StateIndices:
+    """See `StateIndices`; the zero stands behind the state."""
     layout, zero = aircraft.layout, aircraft.layout.size
     harmonics = max(harmonic_count(rotor.blades) for rotor in aircraft.rotors)
     number = np.concatenate([np.full(quads[j + 1] - quads[j], j) for j in range(len(aircraft.rotors))])
@@ -198,7 +198,7 @@ def _places(aircraft: "Aircraft", quads: NDArray[np.int64]) -> R.Places:
                 places[-1, quad] = start + blades - 1
         found[name] = places
     inflow = np.array([layout.inflow(j).start for j in number])
-    return R.Places(
+    return R.StateIndices(
         azimuth=number.astype(np.int64),
         swash=(3 * number + np.arange(3)[:, None]).astype(np.int64),
         inflow=(inflow + np.arange(3)[:, None]).astype(np.int64),

@@ -97,7 +97,7 @@ class Engine:
     @property
     def code(self) -> Code:
         """Machine code of this arrangement."""
-        arrangement = self.n, self.model.blades["speed"].shape[-1]
+        arrangement = self.n, self.model.blades["rotor_speed"].shape[-1]
         if arrangement not in _codes:
             _codes[arrangement] = Code(self)
         return _codes[arrangement]

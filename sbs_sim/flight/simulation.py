@@ -348,7 +348,7 @@ class Simulation:
             step=self.step,
             time=self.time,
             state=self.state.copy(),
-            acceleration=engine.work.vector[:3, 0] + down * self.aircraft.environment.gravity,
+            acceleration=engine.work.acceleration_rows[:3, 0] + down * self.aircraft.environment.gravity,
             swashplate=self.swashplate.copy(),
             azimuth=azimuth,
             loads=engine.work.load_rows.reshape(engine.rotors, -1).copy(),

@@ -58,6 +58,6 @@ def averaged_derivative(derivative, model, x, swash, psi, wind, work, tick, dx, 
             for i in range(size):
                 dx[i] += tick.slopes[0, i, lane] / count
             for i in range(3):
-                dx[size + i] += work.vector[i, lane] / count
+                dx[size + i] += work.acceleration_rows[i, lane] / count
             for i in range(loads.size):
                 loads[i] += work.load_rows[i, lane] / count

@@ -2,16 +2,19 @@
 
 from sbs_sim.lanes import Vector, as_lanes, as_records, rounded, transposed
 from sbs_sim.model import state as S
-from sbs_sim.model.frames import rotation
+from sbs_sim.model.frames import Quaternion, rotation
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.linear import next_column, set_pairs
 from sbs_sim.model.mixing import mix
 from sbs_sim.model.trigonometry import cosine_sine
 
+FORWARD_SPEED, RIGHT_SPEED, DOWN_SPEED, TURN_RATE = range(4)  # of the motion of a trim
+PITCH, ROLL, CONTROLS = range(3)  # first indices of the parts of the unknowns
+
 
 @entry
-def trim_residuals(derivative, model, unknowns, motion, places, equations, scales, mixing, psi, work, tick, inputs,
-                   residuals, loads):  # fmt: skip
+def trim_residuals(derivative, model, unknowns, motion, rotor_indices, equations, scales, mixing, psi, work, tick,
+                   inputs, residuals, loads):  # fmt: skip
     """Scaled residuals of the equations of trim, averaged over the azimuth.
 
     Parameters
@@ -21,10 +24,10 @@ def trim_residuals(derivative, model, unknowns, motion, places, equations, scale
         Sets of unknowns: pitch, roll [rad], pilot controls [rad], rotor states.
     motion : ndarray, shape (4,)
         Velocity forward, right and down in axes of the heading [m/s], rate of the heading [rad/s].
-    places : ndarray of int64
-        Of the rotor states among the unknowns in the simulation state.
+    rotor_indices : ndarray of int64
+        Indices in the simulation state of the rotor states among the unknowns.
     equations : ndarray of int64, shape (n_equations,)
-        Places in the rate of the simulation state.
+        Indices in the rate of the simulation state.
     scales : ndarray, shape (n_equations,)
         What each is divided by.
     mixing : ndarray, shape (3 n_rotors, n_controls)
@@ -52,7 +55,7 @@ def trim_residuals(derivative, model, unknowns, motion, places, equations, scale
                 inputs[i, lane] = unknowns[number // azimuths, i]
             for j in range(psi.shape[1]):
                 tick.psi[j, lane] = psi[number % azimuths, j]
-        set_flight(model, inputs, motion, places, mixing, tick)
+        set_flight(model, inputs, motion, rotor_indices, mixing, tick)
         derivative(
             model, tick.stage, tick.slopes[1, : mixing.shape[0]], tick.psi, tick.wind, work, tick.slopes[0], True
         )
@@ -65,13 +68,13 @@ def trim_residuals(derivative, model, unknowns, motion, places, equations, scale
 
 
 @entry
-def trim_sides(derivative, model, unknowns, steps, owners, motion, places, equations, scales, mixing, psi, work, tick,
-               inputs, columns, residuals):  # fmt: skip
+def trim_sides(derivative, model, unknowns, steps, owners, motion, rotor_indices, equations, scales, mixing, psi, work,
+               tick, inputs, columns, residuals):  # fmt: skip
     """Scaled residuals on both sides of every unknown, averaged over the azimuth, as `trim_residuals` has them.
 
     Parameters
     ----------
-    derivative, model, motion, places, equations, scales, mixing, psi, work, tick, inputs : see `trim_residuals`
+    derivative, model, motion, rotor_indices, equations, scales, mixing, psi, work, tick, inputs : see `trim_residuals`
     unknowns, steps : ndarray, shape (n_unknowns,)
         One set of unknowns, and how far the sides are from it.
     owners, columns : see `sbs_sim.model.linear.jacobian`
@@ -88,7 +91,7 @@ def trim_sides(derivative, model, unknowns, steps, owners, motion, places, equat
         begin = 0
         for owner in range(rotors + 1):
             blades = model.rotors[owner]["blades"] if owner < rotors else 0
-            column, whole = next_column(steps, owners, owner, 0), True
+            column, first_pass = next_column(steps, owners, owner, 0), True
             while column < unknowns.size:
                 count = 0
                 while count < half // azimuths and column < unknowns.size:
@@ -96,8 +99,8 @@ def trim_sides(derivative, model, unknowns, steps, owners, motion, places, equat
                     count += 1
                     column = next_column(steps, owners, owner, column + 1)
                 set_pairs(unknowns, steps, psi, first, azimuths, columns, count, inputs, tick.psi)
-                set_flight(model, inputs, motion, places, mixing, tick)
-                if owner < rotors and not whole:
+                set_flight(model, inputs, motion, rotor_indices, mixing, tick)
+                if owner < rotors and not first_pass:
                     work.span[0], work.span[1] = begin, begin + blades
                 derivative(
                     model,
@@ -109,7 +112,7 @@ def trim_sides(derivative, model, unknowns, steps, owners, motion, places, equat
                     tick.slopes[0],
                     False,
                 )
-                whole = False
+                first_pass = False
                 for lane in range(2 * count * azimuths):
                     changed = columns[lane // 2 // azimuths]
                     for e in range(equations.size):
@@ -120,15 +123,15 @@ def trim_sides(derivative, model, unknowns, steps, owners, motion, places, equat
 
 
 @kernel
-def set_flight(model, inputs, motion, places, mixing, tick):
+def set_flight(model, inputs, motion, rotor_indices, mixing, tick):
     """Simulation states, swashplate angles and still air of sets of unknowns."""
     rotors = as_records(model.rotors)
     given, x, swash = as_lanes(inputs, rotors), as_lanes(tick.stage, rotors), as_lanes(tick.slopes, rotors)[1]
     wind = as_lanes(tick.wind, rotors)
-    set_steady_flight(given[0], given[1], motion, x)
-    for i in range(places.size):
-        x[places[i]] = given[inputs.shape[0] - places.size + i]
-    mix(mixing, given, 2, swash)
+    set_steady_flight(given[PITCH], given[ROLL], motion, x)
+    for i in range(rotor_indices.size):
+        x[rotor_indices[i]] = given[inputs.shape[0] - rotor_indices.size + i]
+    mix(mixing, given, CONTROLS, swash)
     for i in range(3):
         wind[i] = 0.0
 
@@ -138,12 +141,12 @@ def set_steady_flight(pitch, roll, motion, x):
     """State of a body at the origin that heads north; velocities and rates follow its attitude."""
     cp, sp = cosine_sine(0.5 * pitch)
     cr, sr = cosine_sine(0.5 * roll)
-    w, a, b, c = rounded(cr * cp), rounded(sr * cp), rounded(cr * sp), -rounded(sr * sp)
-    to_body = transposed(rotation(w, a, b, c))
-    velocity = to_body @ Vector(motion[0], motion[1], motion[2])
-    rates = to_body @ Vector(0.0, 0.0, motion[3])
+    attitude = Quaternion(rounded(cr * cp), rounded(sr * cp), rounded(cr * sp), -rounded(sr * sp))
+    to_body = transposed(rotation(attitude))
+    velocity = to_body @ Vector(motion[FORWARD_SPEED], motion[RIGHT_SPEED], motion[DOWN_SPEED])
+    omega = to_body @ Vector(0.0, 0.0, motion[TURN_RATE])
     for i in range(x.shape[0]):
         x[i] = 0.0
-    x[3], x[4], x[5], x[6] = w, a, b, c
-    x[S.VELOCITY], x[S.VELOCITY + 1], x[S.VELOCITY + 2] = velocity.x, velocity.y, velocity.z
-    x[S.RATES], x[S.RATES + 1], x[S.RATES + 2] = rates.x, rates.y, rates.z
+    S.set_attitude(x, attitude)
+    S.set_vector(x, S.VELOCITY, velocity)
+    S.set_vector(x, S.RATES, omega)

@@ -2,7 +2,7 @@
 
 A blade is worked out in its own basis (y, t, u): y along the line from lag to flap hinge, t along the motion, u up
 along the shaft. For a counter-clockwise rotor this basis is right-handed; for a clockwise one it is left-handed, and
-angular velocities and moments are then stored with the factor G = -1. In that convention every formula below is the one
+angular velocities and moments are stored with the factor G = -1. In that convention every formula below is the one
 of a counter-clockwise rotor, and mirrored aircraft are mirrored exactly.
 """
 
@@ -15,7 +15,7 @@ from sbs_sim.model.trigonometry import cosine_sine
 
 
 class Pose(NamedTuple):
-    """Where a blade is, and how fast it moves about its hinges.
+    """Azimuth of a blade, and its angles and rates about its hinges.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Pose(NamedTuple):
 
 
 class Basis(NamedTuple):
-    """Directions of a blade; vectors have components along (y, t, u).
+    """Directions and hinges of a blade, eqs. (2.1) and (2.2); vectors have components along (y, t, u).
 
     Attributes
     ----------
@@ -43,8 +43,8 @@ class Basis(NamedTuple):
     cos_flap : lanes
     span, normal : Vector
         d and n.
-    lag_arm, flap_arm : Vector
-        From the axis to the lag hinge, and on to the flap hinge [m].
+    lag_hinge, flap_hinge : Vector
+        e_L e_y, from the hub centre to the lag hinge, and e_F y, from there to the flap hinge [m].
     """
 
     cosine: Any
@@ -52,12 +52,22 @@ class Basis(NamedTuple):
     cos_flap: Any
     span: Any
     normal: Any
-    lag_arm: Any
-    flap_arm: Any
+    lag_hinge: Any
+    flap_hinge: Any
 
 
 class Motion(NamedTuple):
-    """Angular velocities of hub, lag arm and blade [rad/s], eq. (2.3), and what turns them: Omega, xi', beta'."""
+    """Angular velocities [rad/s], along (y, t, u) with the factor G, eq. (2.3).
+
+    Attributes
+    ----------
+    hub, arm, blade : Vector
+        om_h, om_l, om_b: of the rotating hub, of the arm between the hinges, of the blade.
+    spin, lag_rate, flap_rate : Vector
+        Omega, xi' and beta' along the axes that they turn about.
+    body : Vector
+        om.
+    """
 
     hub: Any
     arm: Any
@@ -65,37 +75,52 @@ class Motion(NamedTuple):
     spin: Any
     lag_rate: Any
     flap_rate: Any
-    rates: Any
+    body: Any
 
 
 class Accelerations(NamedTuple):
-    """a_F and a_s of eq. (2.6): along the blade a_F + s a_s [m/s^2], without beta'', xi'' and what the hub adds."""
+    """a_F and a_s of eq. (2.6): a_F + s a_s along the blade [m/s^2], without beta'', xi'' and that of the hub."""
 
     hinge: Any
     slope: Any
 
 
+class ForceMoment(NamedTuple):
+    """Six-vector of section 5.1: a force, and the moment about the hub centre or about the c.g."""
+
+    force: Any
+    moment: Any
+
+
+class HingeMoments(NamedTuple):
+    """Q_beta, Q_xi [N m] and 1 / A_2 of eq. (3.1)."""
+
+    flap: Any
+    lag: Any
+    inverse_lag_inertia: Any
+
+
 @kernel
 def blade_basis(blade, pose):
-    """Directions of eq. (2.1)."""
+    """Directions and hinges of a blade."""
     cos_lag, sin_lag = cosine_sine(pose.xi)
-    cb, sb = cosine_sine(pose.beta)
+    cos_flap, sin_flap = cosine_sine(pose.beta)
     return Basis(
-        pose.cosine * cos_lag + pose.sine * sin_lag,
-        pose.sine * cos_lag - pose.cosine * sin_lag,
-        cb,
-        Vector(cb, ZERO, sb),
-        Vector(-sb, ZERO, cb),
-        Vector(blade.lag_hinge * cos_lag, blade.lag_hinge * sin_lag, ZERO),
-        Vector(blade.flap_hinge, ZERO, ZERO),
+        cosine=pose.cosine * cos_lag + pose.sine * sin_lag,
+        sine=pose.sine * cos_lag - pose.cosine * sin_lag,
+        cos_flap=cos_flap,
+        span=Vector(cos_flap, ZERO, sin_flap),
+        normal=Vector(-sin_flap, ZERO, cos_flap),
+        lag_hinge=Vector(blade.lag_hinge_offset * cos_lag, blade.lag_hinge_offset * sin_lag, ZERO),
+        flap_hinge=Vector(blade.flap_hinge_offset, ZERO, ZERO),
     )
 
 
 @kernel
-def to_blade(blade, basis, hub):
+def to_blade(blade, basis, vector):
     """Components along (y, t, u) of a vector in hub axes."""
     c, s, sense = basis.cosine, basis.sine, blade.sense
-    return Vector(sense * s * hub.y - c * hub.x, s * hub.x + sense * c * hub.y, -hub.z)
+    return Vector(sense * s * vector.y - c * vector.x, s * vector.x + sense * c * vector.y, -vector.z)
 
 
 @kernel
@@ -108,143 +133,162 @@ def to_body(blade, basis, vector):
 
 
 @kernel
-def blade_motion(blade, basis, pose, rates):
-    """Angular velocities; `rates` are those of the body in hub axes [rad/s]."""
-    own = to_blade(blade, basis, rates) * blade.sense
-    spin = Vector(ZERO, ZERO, blade.speed)
+def blade_motion(blade, basis, pose, omega):
+    """Angular velocities of a blade; `omega` is that of the body in hub axes [rad/s]."""
+    body = to_blade(blade, basis, omega) * blade.sense
+    spin = Vector(ZERO, ZERO, blade.rotor_speed)
     lag_rate = Vector(ZERO, ZERO, pose.xi_rate)
     flap_rate = Vector(ZERO, -pose.beta_rate, ZERO)
-    hub = own + spin
+    hub = body + spin
     arm = hub - lag_rate
-    return Motion(hub, arm, arm + flap_rate, spin, lag_rate, flap_rate, own)
+    return Motion(hub, arm, arm + flap_rate, spin, lag_rate, flap_rate, body)
 
 
 @kernel
-def section_flow(blade, basis, motion, air, induced, gradient):
+def section_flow(blade, basis, motion, hub_velocity, induced, gradient):
     """Flow along the blade, eqs. (2.4) and (4.2).
 
     Parameters
     ----------
-    air : Vector
-        Velocity of the hub relative to the air, hub axes [m/s].
+    hub_velocity : Vector
+        V_hub: of the hub relative to the air, hub axes [m/s].
     induced, gradient : lanes
-        Induced velocity at the hub, downwards positive [m/s], and its slope along the blade [1/s].
+        Induced velocity at the hub, downwards positive [m/s], and its slope along the radius [1/s].
     """
-    hinge = to_blade(blade, basis, air) + cross(motion.hub, basis.lag_arm) + cross(motion.arm, basis.flap_arm)
-    along = cross(motion.blade, basis.span)
-    cb = basis.cos_flap
+    hinge = (
+        to_blade(blade, basis, hub_velocity) + cross(motion.hub, basis.lag_hinge) + cross(motion.arm, basis.flap_hinge)
+    )
+    slope = cross(motion.blade, basis.span)
+    cos_flap = basis.cos_flap
     return SectionFlow(
-        hinge.y,
-        along.y,
-        dot(basis.normal, hinge) + cb * (induced + blade.hinge * gradient),
-        dot(basis.normal, along) + cb * gradient,
+        u_t_hinge=hinge.y,
+        u_t_slope=slope.y,
+        u_p_hinge=dot(basis.normal, hinge) + cos_flap * (induced + blade.hinge_offset * gradient),
+        u_p_slope=dot(basis.normal, slope) + cos_flap * gradient,
     )
 
 
 @kernel
 def blade_accelerations(basis, motion):
-    """Eqs. (2.5) and (2.6)."""
-    of_hub = cross(motion.rates, motion.spin)
-    of_arm = of_hub - cross(motion.hub, motion.lag_rate)
-    of_blade = of_arm + cross(motion.arm, motion.flap_rate)
+    """Accelerations along the blade, eqs. (2.5) and (2.6)."""
+    gamma_h = cross(motion.body, motion.spin)
+    gamma_l = gamma_h - cross(motion.hub, motion.lag_rate)
+    gamma_b = gamma_l + cross(motion.arm, motion.flap_rate)
     hinge = (
-        cross(of_hub, basis.lag_arm)
-        + cross(motion.hub, cross(motion.hub, basis.lag_arm))
-        + cross(of_arm, basis.flap_arm)
-        + cross(motion.arm, cross(motion.arm, basis.flap_arm))
+        cross(gamma_h, basis.lag_hinge)
+        + cross(motion.hub, cross(motion.hub, basis.lag_hinge))
+        + cross(gamma_l, basis.flap_hinge)
+        + cross(motion.arm, cross(motion.arm, basis.flap_hinge))
     )
-    slope = cross(of_blade, basis.span) + cross(motion.blade, cross(motion.blade, basis.span))
+    slope = cross(gamma_b, basis.span) + cross(motion.blade, cross(motion.blade, basis.span))
     return Accelerations(hinge, slope)
 
 
 @kernel
-def hinge_moments(blade, basis, pose, loads, hinge, slope):
-    """Q_beta and Q_xi of eq. (3.1), and 1 / A_2; hinge and slope are a_0 and a_s."""
-    cb, e_f = basis.cos_flap, blade.flap_hinge
-    k1 = e_f * blade.mass + cb * blade.first
-    k2 = e_f * blade.first + cb * blade.second
+def hinge_moments(blade, basis, pose, loads, a_0, a_s):
+    """Moments that accelerate flap and lag, eq. (3.1), and the inertia about the lag hinge, eq. (3.2).
+
+    Parameters
+    ----------
+    loads : AirLoads
+    a_0, a_s : Vector
+        Known acceleration of the flap hinge [m/s^2], and its slope along the blade [1/s^2].
+    """
+    cos_flap, e_f = basis.cos_flap, blade.flap_hinge_offset
+    k1 = e_f * blade.mass + cos_flap * blade.first_moment
+    k2 = e_f * blade.first_moment + cos_flap * blade.second_moment
     flap = (
         loads.normal_moment
         - blade.flap_spring * pose.beta
-        - blade.first * dot(basis.normal, hinge)
-        - blade.second * dot(basis.normal, slope)
+        - blade.first_moment * dot(basis.normal, a_0)
+        - blade.second_moment * dot(basis.normal, a_s)
     )
     lag = (
-        k1 * hinge.y
-        + k2 * slope.y
-        - (e_f * loads.forward + cb * loads.forward_moment)
+        k1 * a_0.y
+        + k2 * a_s.y
+        - (e_f * loads.forward_force + cos_flap * loads.forward_moment)
         - blade.lag_spring * pose.xi
         - blade.lag_damping * pose.xi_rate
     )
-    return flap, lag, 1.0 / (e_f * (k1 + cb * blade.first) + cb * cb * blade.second)
+    lag_inertia = e_f * (k1 + cos_flap * blade.first_moment) + cos_flap * cos_flap * blade.second_moment
+    return HingeMoments(flap, lag, 1.0 / lag_inertia)
 
 
 @kernel
-def couplings(blade, basis):
-    """Force and moment about the hub that unit accelerations of flap and lag take, c_beta and c_xi of eq. (5.3)."""
-    cb, e_f = basis.cos_flap, blade.flap_hinge
-    k1 = e_f * blade.mass + cb * blade.first
-    k2 = e_f * blade.first + cb * blade.second_hub
-    hinge = basis.lag_arm + basis.flap_arm
-    motion = Vector(ZERO, 1.0, ZERO)
+def hinge_columns(blade, basis):
+    """c_beta and c_xi of eq. (5.3), about the hub: loads that unit accelerations of flap and lag take off the hub."""
+    cos_flap, e_f = basis.cos_flap, blade.flap_hinge_offset
+    k1 = e_f * blade.mass + cos_flap * blade.first_moment
+    k2 = e_f * blade.first_moment + cos_flap * blade.hub_second_moment
+    hinge = basis.lag_hinge + basis.flap_hinge
+    forward = Vector(ZERO, 1.0, ZERO)  # t
     flap_axis = Vector(ZERO, -1.0, ZERO)
-    flap, lag = basis.normal * blade.first, motion * k1
+    flap, lag = basis.normal * blade.first_moment, forward * k1
     return (
-        flap,
-        cross(hinge, flap) + flap_axis * blade.second_hub,
-        -lag,
-        -(cross(hinge, lag) + cross(basis.span, motion) * k2),
+        ForceMoment(flap, cross(hinge, flap) + flap_axis * blade.hub_second_moment),
+        ForceMoment(-lag, -(cross(hinge, lag) + cross(basis.span, forward) * k2)),
     )
 
 
 @kernel
-def known_loads(blade, basis, loads, hinge, slope):
-    """Force and moment on the hub without accelerations that are sought, P and N of eq. (5.4)."""
-    arm = basis.lag_arm + basis.flap_arm
-    motion = Vector(ZERO, 1.0, ZERO)
-    force = basis.normal * loads.normal + motion * loads.forward - (hinge * blade.mass + slope * blade.first)
-    along = (
+def known_loads(blade, basis, loads, a_0, a_s):
+    """P and N of eq. (5.4): loads of a blade on the hub, without those of the accelerations that are sought.
+
+    Parameters
+    ----------
+    loads : AirLoads
+    a_0, a_s : Vector
+        See `hinge_moments`.
+    """
+    hinge = basis.lag_hinge + basis.flap_hinge
+    forward = Vector(ZERO, 1.0, ZERO)  # t
+    force = (
+        basis.normal * loads.normal_force
+        + forward * loads.forward_force
+        - (a_0 * blade.mass + a_s * blade.first_moment)
+    )
+    first_moment = (
         basis.normal * loads.normal_moment
-        + motion * loads.forward_moment
-        - (hinge * blade.first + slope * blade.second_hub)
+        + forward * loads.forward_moment
+        - (a_0 * blade.first_moment + a_s * blade.hub_second_moment)
     )
-    return force, cross(arm, force) + cross(basis.span, along)
+    return ForceMoment(force, cross(hinge, force) + cross(basis.span, first_moment))
 
 
 @kernel
-def about_cg(blade, basis, force, moment):
-    """Body components of a force at the hub, and of the moment about the c.g."""
-    at_hub = to_body(blade, basis, force)
-    return at_hub, to_body(blade, basis, moment * blade.sense) + cross(blade.hub, at_hub)
+def about_cg(blade, basis, loads):
+    """Body components of a six-vector about the hub centre, moved to the c.g."""
+    force = to_body(blade, basis, loads.force)
+    return ForceMoment(force, to_body(blade, basis, loads.moment * blade.sense) + cross(blade.hub, force))
 
 
 @kernel
 def locked_inertia(blade, basis):
-    """First moment s and the six elements xx, yy, zz, xy, yz, zx of E of a blade that is locked, eq. (5.5)."""
-    h = blade.hub + to_body(blade, basis, basis.lag_arm + basis.flap_arm)
+    """First moment s and the elements xx, yy, zz, xy, yz, zx of E, eq. (5.5), of a blade with locked hinges."""
+    h = blade.hub + to_body(blade, basis, basis.lag_hinge + basis.flap_hinge)
     d = to_body(blade, basis, basis.span)
-    s = h * blade.mass + d * blade.first
-    u = h * blade.first + d * blade.second_hub
+    first = h * blade.mass + d * blade.first_moment
+    along = h * blade.first_moment + d * blade.hub_second_moment
     second = (
-        h.x * s.x + d.x * u.x,
-        h.y * s.y + d.y * u.y,
-        h.z * s.z + d.z * u.z,
-        h.x * s.y + d.x * u.y,
-        h.y * s.z + d.y * u.z,
-        h.z * s.x + d.z * u.x,
+        h.x * first.x + d.x * along.x,
+        h.y * first.y + d.y * along.y,
+        h.z * first.z + d.z * along.z,
+        h.x * first.y + d.x * along.y,
+        h.y * first.z + d.y * along.z,
+        h.z * first.x + d.z * along.x,
     )
-    return s, second
+    return first, second
 
 
 @kernel
 def paper_moment(blade, basis, pose, loads):
     """Moment on the hub in the paper's reading without its inertial part, and the flap axis (theory.md section 9)."""
-    lift = basis.cos_flap * loads.normal
-    arm = basis.lag_arm + basis.flap_arm
+    lift = basis.cos_flap * loads.normal_force
+    hinge = basis.lag_hinge + basis.flap_hinge
     moment = Vector(
-        arm.y * lift - basis.span.z * loads.forward_moment,
-        -(arm.x * lift) - loads.normal_moment - blade.flap_spring * pose.beta,
+        hinge.y * lift - basis.span.z * loads.forward_moment,
+        -(hinge.x * lift) - loads.normal_moment - blade.flap_spring * pose.beta,
         ZERO,
     )
-    axis = Vector(ZERO, -1.0, ZERO)
-    return to_body(blade, basis, moment * blade.sense), to_body(blade, basis, axis * blade.sense)
+    flap_axis = Vector(ZERO, -1.0, ZERO)
+    return to_body(blade, basis, moment * blade.sense), to_body(blade, basis, flap_axis * blade.sense)

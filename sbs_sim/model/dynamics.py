@@ -28,13 +28,15 @@ from sbs_sim.lanes import (
     spread,
     transposed,
 )
+from sbs_sim.model import state as S
 from sbs_sim.model.blade import (
+    ForceMoment,
     Pose,
     about_cg,
     blade_accelerations,
     blade_basis,
     blade_motion,
-    couplings,
+    hinge_columns,
     hinge_moments,
     known_loads,
     locked_inertia,
@@ -43,9 +45,9 @@ from sbs_sim.model.blade import (
     to_blade,
 )
 from sbs_sim.model.duct import duct_thrust
-from sbs_sim.model.frames import quaternion_rates, rotation
+from sbs_sim.model.frames import quaternion_rates, rotation, shaft_down
 from sbs_sim.model.fuselage import plate_drag
-from sbs_sim.model.inflow import disc_flow, inflow_rates
+from sbs_sim.model.inflow import Inflow, disc_flow, inflow_rates
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
 from sbs_sim.model.section import section_loads
@@ -53,21 +55,21 @@ from sbs_sim.model.trigonometry import cosine_sine
 
 
 class Aircraft(NamedTuple):
-    """`Model` and `Work` as lanes: see `sbs_sim.model.records` for their parts."""
+    """`sbs_sim.model.records.Model` as lanes."""
 
     switches: Any
     air: Any
     body: Any
     rotors: Any
     blades: Any
-    places: Any
+    indices: Any
     elements: Any
     knots: Any
     table: Any
 
 
 class Memory(NamedTuple):
-    """`Work` as lanes."""
+    """`sbs_sim.model.records.Work` as lanes."""
 
     state: Any
     terms: Any
@@ -76,7 +78,7 @@ class Memory(NamedTuple):
     hubs: Any
     totals: Any
     harmonics: Any
-    vector: Any
+    acceleration: Any
     flow: Any
     strip: Any
     loads: Any
@@ -84,24 +86,24 @@ class Memory(NamedTuple):
 
 
 class Flight(NamedTuple):
-    """How the body moves.
+    """Motion of the body.
 
     Attributes
     ----------
     to_earth : Matrix
         R_NB.
-    air : Vector
-        Velocity relative to the air, body axes [m/s].
-    velocity, rates : Vector
-        U [m/s] and om [rad/s].
+    air_velocity : Vector
+        Velocity of the c.g. relative to the air, body axes [m/s].
+    velocity, omega : Vector
+        U [m/s] and om [rad/s], body axes.
     gravity : Vector
         Body axes [m/s^2].
     """
 
     to_earth: Any
-    air: Any
+    air_velocity: Any
     velocity: Any
-    rates: Any
+    omega: Any
     gravity: Any
 
 
@@ -121,7 +123,7 @@ def derivative(model, x, swash, psi, wind, work, dx, with_loads):
     wind : ndarray, shape (3, n)
         Velocity of the air over ground, NED [m/s].
     work : Work
-        `work.vector` holds the specific force of the c.g. [m/s^2] and om' [rad/s^2] afterwards.
+        `work.acceleration` holds the specific force of the c.g. [m/s^2] and om' [rad/s^2] afterwards.
     dx : ndarray, shape (size, n)
         Output.
     with_loads : bool
@@ -144,7 +146,7 @@ def in_lanes(model):
         as_records(model.body),
         as_records(model.rotors),
         blades,
-        model.places,
+        model.indices,
         as_records(model.elements),
         as_lanes(model.knots, blades),
         model.table,
@@ -163,7 +165,7 @@ def memory_in_lanes(work):
         as_records(work.hubs),
         as_records(work.totals),
         as_records(work.harmonics),
-        as_lanes(work.vector, sums),
+        as_records(work.acceleration),
         as_records(work.flow),
         as_records(work.strip),
         as_records(work.loads),
@@ -173,189 +175,199 @@ def memory_in_lanes(work):
 
 @kernel
 def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
-    """What `derivative` does of `memory.state`."""
+    """Set the derivative of `memory.state`."""
     flight = body_motion(aircraft, memory.state, wind)
     blade_terms(aircraft, memory, flight, swash, psi)
-    add_up(aircraft, memory)
-    complete = aircraft.switches[0].complete_coupling == 1
-    if complete:
-        start_body(aircraft, memory, flight)
-        solve_with_blades(aircraft, memory)
+    sum_blades(aircraft, memory)
+    set_hub_velocities(aircraft, memory, flight)
+    loads = body_loads(aircraft, memory, flight)
+    if aircraft.switches[0].complete_coupling == 1:
+        solve_with_blades(aircraft, memory, loads)
         solve_blades(aircraft, memory)
         if with_loads:
             hub_loads(aircraft, memory)
     else:
-        start_body(aircraft, memory, flight)
         solve_blades_alone(aircraft, memory)
         hub_loads(aircraft, memory)
-        solve_body_alone(aircraft, memory)
-    body_rates(memory.state, flight, memory.vector, dx)
+        solve_body_alone(aircraft, memory, loads)
+    body_rates(memory, flight, dx)
     rotor_rates(aircraft, memory, dx)
 
 
 @kernel
 def body_motion(aircraft, x, wind):
     """Attitude, velocities and gravity of a state."""
-    to_earth = rotation(x[3], x[4], x[5], x[6])
-    velocity, rates = Vector(x[7], x[8], x[9]), Vector(x[10], x[11], x[12])
-    air = velocity - transposed(to_earth) @ Vector(wind[0], wind[1], wind[2])
-    return Flight(to_earth, air, velocity, rates, to_earth.z * aircraft.air[0].gravity)
+    to_earth = rotation(S.attitude_at(x))
+    velocity, omega = S.vector_at(x, S.VELOCITY), S.vector_at(x, S.RATES)
+    air_velocity = velocity - transposed(to_earth) @ Vector(wind[0], wind[1], wind[2])
+    return Flight(to_earth, air_velocity, velocity, omega, to_earth.z * aircraft.air[0].gravity)
+
+
+class HubMotion(NamedTuple):
+    """Motion of a hub in hub axes: V_hub [m/s], om [rad/s] and om x (om x r_hub) [m/s^2]."""
+
+    air_velocity: Any
+    omega: Any
+    centripetal: Any
 
 
 @kernel
 def hub_motion(part, flight):
-    """Velocity of a hub relative to the air, body rates, and the acceleration om x (om x r_hub), in hub axes."""
-    spin = cross(flight.rates, part.hub)
+    """Motion of the hub of a rotor or blade, eq. (2.4)."""
+    turning = cross(flight.omega, part.hub)
     to_hub = transposed(part.axes)
-    return to_hub @ (flight.air + spin), to_hub @ flight.rates, to_hub @ cross(flight.rates, spin)
+    return HubMotion(
+        to_hub @ (flight.air_velocity + turning), to_hub @ flight.omega, to_hub @ cross(flight.omega, turning)
+    )
 
 
 @kernel
 def blade_terms(aircraft, memory, flight, swash, psi):
-    """What is kept of every blade, and the sums over quads."""
-    switches, air = aircraft.switches[0], aircraft.air[0]
+    """Set the terms of every blade and their sums over quads."""
+    air = aircraft.air[0]
     for r in range(memory.span[0], memory.span[1]):
         blade, terms = aircraft.blades[r], memory.terms[r]
         pose = blade_pose(aircraft, memory.state, blade, psi)
         basis = blade_basis(blade, pose)
-        velocity, rates, known = hub_motion(blade, flight)
-        motion = blade_motion(blade, basis, pose, rates)
-        places, quad = aircraft.places, blade.quad
-        along = spread(memory.state, places.inflow[1], quad, blade) * pose.sine
-        gradient = blade.speed * (spread(memory.state, places.inflow[2], quad, blade) * pose.cosine + along)
-        induced = blade.speed * blade.radius * spread(memory.state, places.inflow[0], quad, blade)
-        flow = section_flow(blade, basis, motion, velocity, induced, gradient)
+        hub = hub_motion(blade, flight)
+        motion = blade_motion(blade, basis, pose, hub.omega)
+        induced, gradient = induced_velocity(aircraft, memory.state, blade, pose)
+        flow = section_flow(blade, basis, motion, hub.air_velocity, induced, gradient)
         pitch = blade_pitch(aircraft, blade, pose, swash)
         elements = aircraft.elements[blade.elements]
         loads = section_loads(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, pitch)
-        if switches.complete_coupling == 1:
-            acting, felt = to_blade(blade, basis, known), to_blade(blade, basis, known)
+        # the hub's known acceleration, as the hinges and as the loads on the hub have it (theory.md sections 3.1, 5.1)
+        if aircraft.switches[0].complete_coupling == 1:
+            at_hinges, at_hub = to_blade(blade, basis, hub.centripetal), to_blade(blade, basis, hub.centripetal)
         else:
-            weight = transposed(blade.axes) @ flight.gravity
-            acting, felt = -to_blade(blade, basis, weight), Vector(0.0, 0.0, 0.0)
-        keep(aircraft, memory, r, pose, basis, motion, loads, acting, felt)
-        terms.ut0, terms.ut1, terms.up0, terms.up1, terms.pitch = flow.t0, flow.t1, flow.p0, flow.p1, pitch
+            gravity = transposed(blade.axes) @ flight.gravity
+            at_hinges, at_hub = -to_blade(blade, basis, gravity), Vector(0.0, 0.0, 0.0)
+        set_terms(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub)
+        terms.u_t_hinge, terms.u_t_slope = flow.u_t_hinge, flow.u_t_slope
+        terms.u_p_hinge, terms.u_p_slope = flow.u_p_hinge, flow.u_p_slope
+        terms.pitch = pitch
+
+
+@kernel
+def induced_velocity(aircraft, x, blade, pose):
+    """Induced velocity at the hub [m/s], and its slope along the radius at the azimuth of blades [1/s], eq. (4.2)."""
+    inflow, quad = aircraft.indices.inflow, blade.quad
+    lambdas = spread(x, inflow[S.SINE], quad, blade) * pose.sine
+    gradient = blade.rotor_speed * (spread(x, inflow[S.COSINE], quad, blade) * pose.cosine + lambdas)
+    return blade.rotor_speed * blade.radius * spread(x, inflow[S.UNIFORM], quad, blade), gradient
 
 
 @kernel
 def blade_pose(aircraft, x, blade, psi):
-    """Azimuths, flap and lag of blades."""
-    places = aircraft.places
-    c, s = cosine_sine(spread(psi, places.azimuth, blade.quad, blade))
-    cosine = c * blade.cos_place - s * blade.sin_place
-    sine = s * blade.cos_place + c * blade.sin_place
-    beta, beta_rate = blade_angle(x, places.flap, places.flap_rate, blade, cosine, sine)
-    xi, xi_rate = blade_angle(x, places.lag, places.lag_rate, blade, cosine, sine)
+    """Azimuths, flap and lag of blades, eqs. (1.4), (1.6) and (1.10)."""
+    indices = aircraft.indices
+    c, s = cosine_sine(spread(psi, indices.azimuth, blade.quad, blade))
+    cosine = c * blade.cos_azimuth_offset - s * blade.sin_azimuth_offset
+    sine = s * blade.cos_azimuth_offset + c * blade.sin_azimuth_offset
+    beta, beta_rate = blade_angle(x, indices.flap, indices.flap_rate, blade, cosine, sine)
+    xi, xi_rate = blade_angle(x, indices.lag, indices.lag_rate, blade, cosine, sine)
     return Pose(cosine, sine, beta, beta_rate, xi, xi_rate)
 
 
 @kernel
 def blade_pitch(aircraft, blade, pose, swash):
     """Pitch of blades at the hinge [rad], eq. (4.8)."""
-    places, quad = aircraft.places, blade.quad
-    c = pose.cosine * blade.cos_phase - pose.sine * blade.sin_phase
-    s = pose.sine * blade.cos_phase + pose.cosine * blade.sin_phase
-    collective = spread(swash, places.swash[0], quad, blade)
-    lateral = spread(swash, places.swash[1], quad, blade)
-    longitudinal = spread(swash, places.swash[2], quad, blade)
+    angles, quad = aircraft.indices.swash, blade.quad
+    cosine = pose.cosine * blade.cos_phase - pose.sine * blade.sin_phase  # of psi_k + psi_s
+    sine = pose.sine * blade.cos_phase + pose.cosine * blade.sin_phase
+    collective = spread(swash, angles[S.COLLECTIVE], quad, blade)
+    lateral = spread(swash, angles[S.LATERAL], quad, blade)
+    longitudinal = spread(swash, angles[S.LONGITUDINAL], quad, blade)
     return (
         collective
-        - blade.sense * lateral * c
-        - longitudinal * s
-        - blade.pitch_flap * pose.beta
-        - blade.pitch_lag * pose.xi
+        - blade.sense * lateral * cosine
+        - longitudinal * sine
+        - blade.pitch_flap_coupling * pose.beta
+        - blade.pitch_lag_coupling * pose.xi
     )
 
 
 @kernel
-def keep(aircraft, memory, r, pose, basis, motion, loads, acting, felt):
-    """Keep the terms of a register of blades, and add what the body's equations need of them to the sums."""
-    blade, terms, switches = aircraft.blades[r], memory.terms[r], aircraft.switches[0]
+def set_terms(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub):
+    """Set the terms of register r of blades, and add to the sums what the equations of the body need of them.
+
+    `at_hinges` and `at_hub` are known accelerations of the hub [m/s^2], see `blade_terms`.
+    """
+    blade, terms = aircraft.blades[r], memory.terms[r]
     own = blade_accelerations(basis, motion)
-    flap_moment, lag_moment, inverse_a2 = hinge_moments(blade, basis, pose, loads, own.hinge + acting, own.slope)
-    flap_force, flap_arm, lag_force, lag_arm = couplings(blade, basis)
-    flap_force, flap_arm = about_cg(blade, basis, flap_force, flap_arm)
-    lag_force, lag_arm = about_cg(blade, basis, lag_force, lag_arm)
-    force, moment = known_loads(blade, basis, loads, own.hinge + felt, own.slope)
-    force, moment = about_cg(blade, basis, force, moment)
+    moments = hinge_moments(blade, basis, pose, loads, own.hinge + at_hinges, own.slope)
+    flap, lag = hinge_columns(blade, basis)
+    flap, lag = about_cg(blade, basis, flap), about_cg(blade, basis, lag)
+    known = about_cg(blade, basis, known_loads(blade, basis, loads, own.hinge + at_hub, own.slope))
+    inverse_lag_inertia = blade.lead_lag * moments.inverse_lag_inertia
     terms.cosine, terms.sine = pose.cosine, pose.sine
-    terms.flap_force, terms.flap_arm = flap_force, flap_arm
-    terms.lag_force, terms.lag_arm = lag_force, lag_arm
-    inverse_a2 = blade.lead_lag * inverse_a2
-    terms.flap_moment, terms.lag_moment, terms.inverse_a2 = flap_moment, lag_moment, inverse_a2
-    terms.force, terms.moment = force, moment
-    if switches.complete_hub_moment == 0:
+    terms.flap_column_force, terms.flap_column_moment = flap.force, flap.moment
+    terms.lag_column_force, terms.lag_column_moment = lag.force, lag.moment
+    terms.flap_moment, terms.lag_moment = moments.flap, moments.lag
+    terms.inverse_lag_inertia = inverse_lag_inertia
+    terms.known_force, terms.known_moment = known.force, known.moment
+    if aircraft.switches[0].complete_hub_moment == 0:
         terms.paper_moment, terms.flap_axis = paper_moment(blade, basis, pose, loads)
-    thrust = basis.cos_flap * loads.normal
-    root = blade.hinge * loads.normal + loads.normal_moment
-    first, second = locked_inertia(blade, basis)
-    flap, lag = rounded(blade.inverse_second * flap_moment), rounded(inverse_a2 * lag_moment)
-    xx, yy, zz, xy, yz, zx = second
-    p = (flap_force.x, flap_force.y, flap_force.z, flap_arm.x, flap_arm.y, flap_arm.z)
-    q = (lag_force.x, lag_force.y, lag_force.z, lag_arm.x, lag_arm.y, lag_arm.z)
-    left_force = force - flap_force * flap - lag_force * lag
-    left_moment = moment - flap_arm * flap - lag_arm * lag
+    thrust = basis.cos_flap * loads.normal_force
+    root_moment = blade.hinge_offset * loads.normal_force + loads.normal_moment  # Int (e_0 + s) dF_n
+    first_moment, second_moment = locked_inertia(blade, basis)
+    flap_acceleration = rounded(blade.inverse_second_moment * moments.flap)  # of a body that does not accelerate
+    lag_acceleration = rounded(inverse_lag_inertia * moments.lag)
     add_to_quads(
         memory.sums,
         blade.quad,
-        blade.begins,
+        blade.starts_quad,
         "thrust",
-        (
-            thrust,
-            root * pose.sine,
-            root * pose.cosine,
-            blade.mass,
-            first,
-            xx,
-            yy,
-            zz,
-            xy,
-            yz,
-            zx,
-            left_force,
-            left_moment,
+        (thrust, root_moment * pose.sine, root_moment * pose.cosine, blade.mass, first_moment)
+        + second_moment
+        + (
+            known.force - flap.force * flap_acceleration - lag.force * lag_acceleration,
+            known.moment - flap.moment * flap_acceleration - lag.moment * lag_acceleration,
         )
-        + triangle(p, q, blade.inverse_second, inverse_a2),
+        + hinge_inertia(flap, lag, blade.inverse_second_moment, inverse_lag_inertia),
     )
 
 
 @kernel
-def triangle(p, q, flap, lag):
-    """Lower triangle of flap p p^T + lag q q^T, row by row."""
-    p0, p1, p2, p3, p4, p5 = p
-    q0, q1, q2, q3, q4, q5 = q
-    a0, a1, a2 = rounded(flap * p0), rounded(flap * p1), rounded(flap * p2)
-    a3, a4, a5 = rounded(flap * p3), rounded(flap * p4), rounded(flap * p5)
-    b0, b1, b2 = rounded(lag * q0), rounded(lag * q1), rounded(lag * q2)
-    b3, b4, b5 = rounded(lag * q3), rounded(lag * q4), rounded(lag * q5)
+def hinge_inertia(flap, lag, inverse_flap_inertia, inverse_lag_inertia):
+    """c_beta c_beta^T / A_1 + c_xi c_xi^T / A_2 of eq. (5.8), block by block, in the order of SUMS."""
+    flap_force, flap_moment = scaled(flap.force, inverse_flap_inertia), scaled(flap.moment, inverse_flap_inertia)
+    lag_force, lag_moment = scaled(lag.force, inverse_lag_inertia), scaled(lag.moment, inverse_lag_inertia)
     return (
-        a0 * p0 + b0 * q0,
-        a1 * p0 + b1 * q0,
-        a1 * p1 + b1 * q1,
-        a2 * p0 + b2 * q0,
-        a2 * p1 + b2 * q1,
-        a2 * p2 + b2 * q2,
-        a3 * p0 + b3 * q0,
-        a3 * p1 + b3 * q1,
-        a3 * p2 + b3 * q2,
-        a3 * p3 + b3 * q3,
-        a4 * p0 + b4 * q0,
-        a4 * p1 + b4 * q1,
-        a4 * p2 + b4 * q2,
-        a4 * p3 + b4 * q3,
-        a4 * p4 + b4 * q4,
-        a5 * p0 + b5 * q0,
-        a5 * p1 + b5 * q1,
-        a5 * p2 + b5 * q2,
-        a5 * p3 + b5 * q3,
-        a5 * p4 + b5 * q4,
-        a5 * p5 + b5 * q5,
+        symmetric_products(flap_force, flap.force, lag_force, lag.force)
+        + outer_products(flap_moment, flap.force, lag_moment, lag.force)
+        + symmetric_products(flap_moment, flap.moment, lag_moment, lag.moment)
     )
 
 
 @kernel
-def add_up(aircraft, memory):
-    """Sums over each rotor, and over all of them."""
+def scaled(vector, factor):
+    """Vector times a number, rounded."""
+    return Vector(factor * vector.x, factor * vector.y, factor * vector.z)
+
+
+@kernel
+def symmetric_products(a, p, b, q):
+    """Elements xx, yy, zz, xy, yz, zx of a p^T + b q^T, which is symmetric."""
+    return (
+        a.x * p.x + b.x * q.x,
+        a.y * p.y + b.y * q.y,
+        a.z * p.z + b.z * q.z,
+        a.y * p.x + b.y * q.x,
+        a.z * p.y + b.z * q.y,
+        a.z * p.x + b.z * q.x,
+    )
+
+
+@kernel
+def outer_products(a, p, b, q):
+    """Rows of a p^T + b q^T."""
+    return p * a.x + q * b.x, p * a.y + q * b.y, p * a.z + q * b.z
+
+
+@kernel
+def sum_blades(aircraft, memory):
+    """Set the sums over each rotor, and over all of them."""
     rotors = aircraft.rotors.shape[0]
     for j in range(rotors):
         first = aircraft.rotors[j].first_quad
@@ -369,54 +381,25 @@ def add_up(aircraft, memory):
 
 
 @kernel
-def start_body(aircraft, memory, flight):
-    """Known side of the rigid part and the ducts, first part of eq. (5.7)."""
-    air, body, om = aircraft.air[0], aircraft.body[0], flight.rates
-    force = plate_drag(air.density, air.plate_areas, flight.air) - cross(om, cross(om, body.first_moment))
-    moment = -cross(om, body.inertia @ om)
+def set_hub_velocities(aircraft, memory, flight):
+    """Set the velocity of every hub relative to the air, hub axes."""
+    for j in range(aircraft.rotors.shape[0]):
+        memory.flow[j].velocity = hub_motion(aircraft.rotors[j], flight).air_velocity
+
+
+@kernel
+def body_loads(aircraft, memory, flight):
+    """Loads on the rigid part: fuselage drag, ducts and gyroscopic terms, first part of eq. (5.7)."""
+    air, body, omega = aircraft.air[0], aircraft.body[0], flight.omega
+    drag = plate_drag(air.density, air.plate_areas, flight.air_velocity)
+    force = drag - cross(omega, cross(omega, body.first_moment))
+    moment = -cross(omega, body.inertia @ omega)
     for j in range(aircraft.rotors.shape[0]):
         rotor = aircraft.rotors[j]
-        duct = rotor.axes @ Vector(0.0, 0.0, -duct_thrust(rotor.duct, memory.totals[j].thrust))
+        duct = rotor.axes @ Vector(0.0, 0.0, -duct_thrust(rotor.duct_expansion, memory.totals[j].thrust))
         force = force + duct
         moment = moment + cross(rotor.hub, duct)
-        velocity, _, _ = hub_motion(rotor, flight)
-        memory.flow[j].velocity = velocity
-    set_vector(memory.vector, force, moment)
-
-
-@kernel
-def set_vector(row, force, moment):
-    """Six numbers of two vectors."""
-    row[0], row[1], row[2] = force.x, force.y, force.z
-    row[3], row[4], row[5] = moment.x, moment.y, moment.z
-
-
-@kernel
-def solve_with_blades(aircraft, memory):
-    """Specific force and angular acceleration of the body with all blades eliminated (`complete`), eq. (5.8)."""
-    body, b = aircraft.body[0], memory.vector
-    total = memory.totals[aircraft.rotors.shape[0]]
-    b[0], b[1], b[2] = b[0] + total.force.x, b[1] + total.force.y, b[2] + total.force.z
-    b[3], b[4], b[5] = b[3] + total.moment.x, b[4] + total.moment.y, b[5] + total.moment.z
-    mass, s = body.mass + total.mass, body.first_moment + total.first_moment
-    e = total.second_moment
-    xx, yy, zz, xy, yz, zx = e[0], e[1], e[2], e[3], e[4], e[5]
-    inertia, t = body.inertia, total.triangle
-    forces = Symmetric(mass - t[0], mass - t[2], mass - t[5], -t[1], -t[4], -t[3])
-    coupling = Matrix(
-        Vector(-t[6], -s.z - t[7], s.y - t[8]),
-        Vector(s.z - t[10], -t[11], -s.x - t[12]),
-        Vector(-s.y - t[15], s.x - t[16], -t[17]),
-    )
-    moments = Symmetric(
-        inertia.x.x + (yy + zz) - t[9],
-        inertia.y.y + (zz + xx) - t[14],
-        inertia.z.z + (xx + yy) - t[20],
-        inertia.y.x - xy - t[13],
-        inertia.z.y - yz - t[19],
-        inertia.z.x - zx - t[18],
-    )
-    solve_body(forces, coupling, moments, b)
+    return ForceMoment(force, moment)
 
 
 class Symmetric(NamedTuple):
@@ -428,6 +411,46 @@ class Symmetric(NamedTuple):
     xy: Any
     yz: Any
     zx: Any
+
+
+@kernel
+def symmetric(elements):
+    """Symmetric matrix of a field of six lanes, or of a matrix of six elements."""
+    return Symmetric(elements[0], elements[1], elements[2], elements[3], elements[4], elements[5])
+
+
+@kernel
+def solve_with_blades(aircraft, memory, loads):
+    """Set specific force and angular acceleration of the body, all blades eliminated (`complete`), eq. (5.8)."""
+    body, total = aircraft.body[0], memory.totals[aircraft.rotors.shape[0]]
+    right = ForceMoment(loads.force + total.force, loads.moment + total.moment)
+    m, s, i = body.mass + total.mass, body.first_moment + total.first_moment, body.inertia
+    e = symmetric(total.second_moment)
+    # less what the hinges give way, c c^T / A
+    h_force, h_coupling, h_moment = symmetric(total.hinge_mass), total.hinge_coupling, symmetric(total.hinge_inertia)
+    force_block = Symmetric(m - h_force.xx, m - h_force.yy, m - h_force.zz, -h_force.xy, -h_force.yz, -h_force.zx)
+    coupling_block = Matrix(
+        Vector(-h_coupling.x.x, -s.z - h_coupling.x.y, s.y - h_coupling.x.z),
+        Vector(s.z - h_coupling.y.x, -h_coupling.y.y, -s.x - h_coupling.y.z),
+        Vector(-s.y - h_coupling.z.x, s.x - h_coupling.z.y, -h_coupling.z.z),
+    )
+    moment_block = Symmetric(
+        i.x.x + (e.yy + e.zz) - h_moment.xx,
+        i.y.y + (e.zz + e.xx) - h_moment.yy,
+        i.z.z + (e.xx + e.yy) - h_moment.zz,
+        i.y.x - e.xy - h_moment.xy,
+        i.z.y - e.yz - h_moment.yz,
+        i.z.x - e.zx - h_moment.zx,
+    )
+    solved = solve_blocks(force_block, coupling_block, moment_block, right)
+    set_acceleration(memory, solved.force, solved.moment)
+
+
+@kernel
+def set_acceleration(memory, specific_force, angular):
+    """Set the acceleration of the body: specific force of the c.g. [m/s^2] and om' [rad/s^2]."""
+    acceleration = memory.acceleration[0]
+    acceleration.specific_force, acceleration.angular = specific_force, angular
 
 
 @kernel
@@ -445,140 +468,150 @@ def inverted(m):
     """Inverse of a symmetric positive definite matrix, by its cofactors."""
     xx, xy, zx = m.yy * m.zz - m.yz * m.yz, m.yz * m.zx - m.xy * m.zz, m.xy * m.yz - m.yy * m.zx
     yy, zz, yz = m.zz * m.xx - m.zx * m.zx, m.xx * m.yy - m.xy * m.xy, m.xy * m.zx - m.xx * m.yz
-    share = 1.0 / (m.xx * xx + m.xy * xy + m.zx * zx)
+    inverse_determinant = 1.0 / (m.xx * xx + m.xy * xy + m.zx * zx)
     return Symmetric(
-        rounded(xx * share),
-        rounded(yy * share),
-        rounded(zz * share),
-        rounded(xy * share),
-        rounded(yz * share),
-        rounded(zx * share),
+        rounded(xx * inverse_determinant),
+        rounded(yy * inverse_determinant),
+        rounded(zz * inverse_determinant),
+        rounded(xy * inverse_determinant),
+        rounded(yz * inverse_determinant),
+        rounded(zx * inverse_determinant),
     )
 
 
 @kernel
-def solve_body(forces, coupling, moments, b):
-    """Solve [forces, coupling^T; coupling, moments] y = b for y, which overwrites b, by the Schur complement."""
-    force, moment = Vector(b[0], b[1], b[2]), Vector(b[3], b[4], b[5])
-    flexible = inverted(forces)
-    x, y, z = times(flexible, coupling.x), times(flexible, coupling.y), times(flexible, coupling.z)
-    left = Symmetric(
-        moments.xx - dot(coupling.x, x),
-        moments.yy - dot(coupling.y, y),
-        moments.zz - dot(coupling.z, z),
-        moments.xy - dot(coupling.x, y),
-        moments.yz - dot(coupling.y, z),
-        moments.zx - dot(coupling.z, x),
+def solve_blocks(force_block, coupling, moment_block, right):
+    """Solve [force_block, coupling^T; coupling, moment_block] y = right by the Schur complement."""
+    inverse = inverted(force_block)
+    x, y, z = times(inverse, coupling.x), times(inverse, coupling.y), times(inverse, coupling.z)
+    complement = Symmetric(
+        moment_block.xx - dot(coupling.x, x),
+        moment_block.yy - dot(coupling.y, y),
+        moment_block.zz - dot(coupling.z, z),
+        moment_block.xy - dot(coupling.x, y),
+        moment_block.yz - dot(coupling.y, z),
+        moment_block.zx - dot(coupling.z, x),
     )
-    shares = Matrix(x, y, z)  # coupling @ flexible
-    turn = times(inverted(left), moment - shares @ force)
-    set_vector(b, times(flexible, force) - transposed(shares) @ turn, turn)
+    gain = Matrix(x, y, z)  # coupling @ inverse
+    angular = times(inverted(complement), right.moment - gain @ right.force)
+    return ForceMoment(times(inverse, right.force) - transposed(gain) @ angular, angular)
 
 
 @kernel
 def solve_blades(aircraft, memory):
-    """Flap and lag accelerations of every blade once those of the body are known, eq. (5.9)."""
-    b = memory.vector
-    force, moment = Vector(b[0], b[1], b[2]), Vector(b[3], b[4], b[5])
+    """Set flap and lag accelerations of every blade from those of the body, eq. (5.9)."""
+    body = memory.acceleration[0]
     for r in range(aircraft.blades.shape[0]):
         blade, terms = aircraft.blades[r], memory.terms[r]
-        flap = terms.flap_moment - dot(terms.flap_force, force) - dot(terms.flap_arm, moment)
-        lag = terms.lag_moment - dot(terms.lag_force, force) - dot(terms.lag_arm, moment)
-        terms.flap_acceleration = flap * blade.inverse_second
-        terms.lag_acceleration = lag * terms.inverse_a2
+        flap = (
+            terms.flap_moment
+            - dot(terms.flap_column_force, body.specific_force)
+            - dot(terms.flap_column_moment, body.angular)
+        )
+        lag = (
+            terms.lag_moment
+            - dot(terms.lag_column_force, body.specific_force)
+            - dot(terms.lag_column_moment, body.angular)
+        )
+        terms.flap_acceleration = flap * blade.inverse_second_moment
+        terms.lag_acceleration = lag * terms.inverse_lag_inertia
 
 
 @kernel
 def solve_blades_alone(aircraft, memory):
-    """Flap and lag accelerations of every blade on a hub that does not accelerate (`paper`)."""
+    """Set flap and lag accelerations of every blade on a hub that does not accelerate (`paper`)."""
     for r in range(aircraft.blades.shape[0]):
         blade, terms = aircraft.blades[r], memory.terms[r]
-        terms.flap_acceleration = terms.flap_moment * blade.inverse_second
-        terms.lag_acceleration = terms.lag_moment * terms.inverse_a2
+        terms.flap_acceleration = terms.flap_moment * blade.inverse_second_moment
+        terms.lag_acceleration = terms.lag_moment * terms.inverse_lag_inertia
 
 
 @kernel
 def hub_loads(aircraft, memory):
-    """Thrust, shaft torque, force and moment of each rotor on its hub (theory.md section 5.5)."""
-    switches, b = aircraft.switches[0], memory.vector
+    """Set thrust, shaft torque, force and moment of each rotor on its hub (theory.md section 5.5)."""
+    sum_hub_loads(aircraft, memory)
+    switches = aircraft.switches[0]
+    for j in range(aircraft.rotors.shape[0]):
+        rotor, loads, total = aircraft.rotors[j], memory.loads[j], memory.totals[j]
+        force, moment, paper = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
+        for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
+            part = memory.hubs[quad]
+            force, moment, paper = force + part.force, moment + part.moment, paper + part.paper_moment
+        if switches.complete_coupling == 1:
+            locked = locked_loads(total, memory.acceleration[0])
+            force, moment = force - locked.force, moment - locked.moment
+        moment = moment - cross(rotor.hub, force)
+        down = shaft_down(rotor.axes)
+        axial = dot(down, moment)
+        if switches.complete_hub_moment == 0:  # across the shaft the paper's reading (theory.md section 9)
+            moment = down * axial + paper
+            axial = dot(down, moment)
+        loads.thrust, loads.torque = total.thrust, rotor.sense * axial
+        loads.force, loads.moment = force, moment
+
+
+@kernel
+def sum_hub_loads(aircraft, memory):
+    """Set the sums over quads of eq. (5.1) without J_k, about the c.g., and of the moment in the paper's reading."""
     for r in range(aircraft.blades.shape[0]):
         blade, terms = aircraft.blades[r], memory.terms[r]
         flap, lag = terms.flap_acceleration, terms.lag_acceleration
-        force = terms.force - terms.flap_force * flap - terms.lag_force * lag
-        moment = terms.moment - terms.flap_arm * flap - terms.lag_arm * lag
-        add_to_quads(memory.hubs, blade.quad, blade.begins, "force", (force, moment))
-        if switches.complete_hub_moment == 0:
-            inertial = blade.lead_lag * blade.second_hub * flap
-            add_to_quads(
-                memory.hubs, blade.quad, blade.begins, "paper", (terms.paper_moment - terms.flap_axis * inertial,)
-            )
-    for j in range(aircraft.rotors.shape[0]):
-        rotor, out, total = aircraft.rotors[j], memory.loads[j], memory.totals[j]
-        force, moment, paper = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
-        for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
-            hub = memory.hubs[quad]
-            force, moment, paper = force + hub.force, moment + hub.moment, paper + hub.paper
-        if switches.complete_coupling == 1:
-            carried, turned = carried_blades(total, Vector(b[0], b[1], b[2]), Vector(b[3], b[4], b[5]))
-            force, moment = force - carried, moment - turned
-        moment = moment - cross(rotor.hub, force)
-        shaft = Vector(rotor.axes.x.z, rotor.axes.y.z, rotor.axes.z.z)  # z_h, against the thrust
-        axial = dot(shaft, moment)
-        if switches.complete_hub_moment == 0:  # across the shaft the paper's reading (theory.md section 9)
-            moment = shaft * axial + paper
-            axial = dot(shaft, moment)
-        out.thrust, out.torque = total.thrust, rotor.sense * axial
-        out.force, out.moment = force, moment
+        force = terms.known_force - terms.flap_column_force * flap - terms.lag_column_force * lag
+        moment = terms.known_moment - terms.flap_column_moment * flap - terms.lag_column_moment * lag
+        add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "force", (force, moment))
+        if aircraft.switches[0].complete_hub_moment == 0:
+            inertial = blade.lead_lag * blade.hub_second_moment * flap
+            paper = terms.paper_moment - terms.flap_axis * inertial
+            add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "paper_moment", (paper,))
 
 
 @kernel
-def carried_blades(total, force, turn):
-    """Force and moment about the c.g. that accelerate the locked blades of a rotor along with the body, J x."""
-    s, e = total.first_moment, total.second_moment
-    xx, yy, zz, xy, yz, zx = e[0], e[1], e[2], e[3], e[4], e[5]
+def locked_loads(total, body):
+    """J x of eq. (5.6) about the c.g.: what accelerates the blades of a rotor, their hinges locked, with the body."""
+    force, turn = body.specific_force, body.angular
+    s, e = total.first_moment, symmetric(total.second_moment)
     moment = cross(s, force) + Vector(
-        (yy + zz) * turn.x - xy * turn.y - zx * turn.z,
-        (zz + xx) * turn.y - xy * turn.x - yz * turn.z,
-        (xx + yy) * turn.z - zx * turn.x - yz * turn.y,
+        (e.yy + e.zz) * turn.x - e.xy * turn.y - e.zx * turn.z,
+        (e.zz + e.xx) * turn.y - e.xy * turn.x - e.yz * turn.z,
+        (e.xx + e.yy) * turn.z - e.zx * turn.x - e.yz * turn.y,
     )
-    return force * total.mass + cross(turn, s), moment
+    return ForceMoment(force * total.mass + cross(turn, s), moment)
 
 
 @kernel
-def solve_body_alone(aircraft, memory):
-    """Specific force and angular acceleration of the rigid aircraft under the hub loads (`paper`)."""
-    body, b = aircraft.body[0], memory.vector
-    force, moment = Vector(b[0], b[1], b[2]), Vector(b[3], b[4], b[5])
+def solve_body_alone(aircraft, memory, loads):
+    """Set specific force and angular acceleration of the rigid aircraft under the hub loads (`paper`), eq. (5.11)."""
+    body, total = aircraft.body[0], with_hub_loads(aircraft, memory, loads)
+    i = body.inertia
+    inertia = Symmetric(i.x.x, i.y.y, i.z.z, i.y.x, i.z.y, i.z.x)
+    set_acceleration(memory, total.force * (1.0 / body.mass), times(inverted(inertia), total.moment))
+
+
+@kernel
+def with_hub_loads(aircraft, memory, loads):
+    """Loads about the c.g. with those of the rotors on their hubs added."""
+    force, moment = loads.force, loads.moment
     for j in range(aircraft.rotors.shape[0]):
-        rotor, out = aircraft.rotors[j], memory.loads[j]
-        force = force + out.force
-        moment = moment + (out.moment + cross(rotor.hub, out.force))
-    turn = times(inverse_of(body.inertia), moment)
-    set_vector(b, force * (1.0 / body.mass), turn)
+        hub, of_rotor = aircraft.rotors[j].hub, memory.loads[j]
+        force = force + of_rotor.force
+        moment = moment + (of_rotor.moment + cross(hub, of_rotor.force))
+    return ForceMoment(force, moment)
 
 
 @kernel
-def inverse_of(matrix):
-    """Inverse of a symmetric matrix that is given by rows."""
-    rows = Symmetric(matrix.x.x, matrix.y.y, matrix.z.z, matrix.y.x, matrix.z.y, matrix.z.x)
-    return inverted(rows)
-
-
-@kernel
-def body_rates(x, flight, acceleration, dx):
-    """Rates of position, attitude, velocity and angular velocity (theory.md section 5.6)."""
-    position = flight.to_earth @ flight.velocity
-    dx[0], dx[1], dx[2] = position.x, position.y, position.z
-    dx[3], dx[4], dx[5], dx[6] = quaternion_rates(x[3], x[4], x[5], x[6], flight.rates)
-    specific = Vector(acceleration[0], acceleration[1], acceleration[2])
-    velocity = specific + flight.gravity - cross(flight.rates, flight.velocity)
-    dx[7], dx[8], dx[9] = velocity.x, velocity.y, velocity.z
-    dx[10], dx[11], dx[12] = acceleration[3], acceleration[4], acceleration[5]
+def body_rates(memory, flight, dx):
+    """Set the rates of position, attitude, velocity and angular velocity (theory.md section 5.6)."""
+    acceleration = memory.acceleration[0]
+    S.set_vector(dx, S.POSITION, flight.to_earth @ flight.velocity)
+    S.set_attitude(dx, quaternion_rates(S.attitude_at(memory.state), flight.omega))
+    velocity_rate = acceleration.specific_force + flight.gravity - cross(flight.omega, flight.velocity)
+    S.set_vector(dx, S.VELOCITY, velocity_rate)
+    S.set_vector(dx, S.RATES, acceleration.angular)
 
 
 @kernel
 def rotor_rates(aircraft, memory, dx):
-    """Rates of the multiblade coordinates (paper eqs. [13], [14]) and of the inflow."""
+    """Set the rates of the multiblade coordinates (paper eqs. [13], [14]) and of the inflow."""
     x, lead_lag = memory.state, aircraft.switches[0].lead_lag
     for r in range(aircraft.blades.shape[0]):
         add_accelerations(aircraft.blades[r], memory.terms[r], memory.means, memory.harmonics)
@@ -589,18 +622,23 @@ def rotor_rates(aircraft, memory, dx):
         set_accelerations(rotor, memory.means, memory.harmonics, dx)
         add_rotation_terms(rotor, x, dx, rotor.flap, rotor.flap_rate, 1.0)
         add_rotation_terms(rotor, x, dx, rotor.lag, rotor.lag_rate, 1.0 * lead_lag)
-        set_inflow(aircraft, memory, j, dx)
+        set_inflow_rates(aircraft, memory, j, dx)
 
 
 @kernel
-def set_inflow(aircraft, memory, j, dx):
-    """Inflow rates of a rotor from the sums of its blades."""
+def set_inflow_rates(aircraft, memory, j, dx):
+    """Set the inflow rates of a rotor from the sums over its blades, eqs. (6.1) and (6.2)."""
     rotor, total, x = aircraft.rotors[j], memory.totals[j], memory.state
-    at, scale = rotor.inflow, rotor.load_scale
-    lambda0, lambdas, lambdac = x[at], x[at + 1], x[at + 2]
+    uniform, sine, cosine = rotor.inflow + S.UNIFORM, rotor.inflow + S.SINE, rotor.inflow + S.COSINE
     mu = memory.flow[j].velocity * rotor.inverse_tip_speed
-    moments = scale / rotor.radius
-    loads = Vector(total.thrust * scale, total.cosine_moment * moments, total.sine_moment * moments)
-    flow = disc_flow(lambda0, mu, rotor.sense)
-    rates = inflow_rates(rotor, Vector(lambda0, lambdac, lambdas), flow, loads, aircraft.switches[0].cyclic_inflow)
-    dx[at], dx[at + 1], dx[at + 2] = rates.x, rates.z, rates.y
+    scale = rotor.coefficient_scale
+    moment_scale = scale / rotor.radius
+    loads = Inflow(
+        rounded(total.thrust * scale),
+        rounded(total.cosine_moment * moment_scale),
+        rounded(total.sine_moment * moment_scale),
+    )
+    flow = disc_flow(x[uniform], mu, rotor.sense)
+    states = Inflow(x[uniform], x[cosine], x[sine])
+    rates = inflow_rates(rotor, states, flow, loads, aircraft.switches[0].cyclic_inflow)
+    dx[uniform], dx[cosine], dx[sine] = rates.uniform, rates.cosine, rates.sine

@@ -1,10 +1,10 @@
-"""Exponential Runge-Kutta steps: what is stiff in a rotor is solved exactly (theory.md section 7.3).
+"""Exponential Runge-Kutta steps: the stiff linear part of a rotor is solved exactly (theory.md section 7.3).
 
-y' = L y + n(y, t) with a constant matrix L for each set of states of a rotor that belong together. L changes the error
-of a step and nothing else: the method is of fourth order whatever it is.
+y' = L y + n(y, t) with a constant matrix L for each block of coupled states of a rotor. L changes the error of a
+step only: the method is of fourth order for any L.
 S. Krogstad: Generalized integrating factor methods for stiff PDEs, Journal of Computational Physics 203, 2005, section
 3.2 (ETDRK4-B). In the derivatives of the stages it is a Runge-Kutta method whose coefficients are matrices; L = 0 gives
-the classical one, which the body has.
+the classical method, which the body has.
 """
 
 import numpy as np
@@ -18,20 +18,20 @@ Array = NDArray[np.float64]
 STAGES = 4
 COEFFICIENTS = STAGES * (STAGES + 1) // 2
 TERMS = 16  # of Taylor's series
-SMALL = 0.5  # row sum norm up to which it is used: the last term is then below the last bit
+MAX_NORM = 0.5  # row sum norm up to which it is used: the last term is then below the last bit
 
 
 @kernel
 def begin_exponential_step(rotors, parts, state):
-    """Take the rotors' states at the beginning of a step into the order of the blocks."""
+    """Copy the rotors' states at the beginning of a step in the order of the blocks."""
     begin = as_lanes(parts.begin, rotors)
-    for i in range(parts.places.size):
-        begin[parts.positions[i]] = state[parts.places[i]]
+    for i in range(parts.states.size):
+        begin[parts.block_positions[i]] = state[parts.states[i]]
 
 
 @kernel
 def exponential_stage(rotors, blades, parts, slope, k, stage):
-    """Set the rotors' states of the stage that follows stage k, the last one being the new state.
+    """Set the rotors' states at the stage after stage k; after the last stage that is the new state.
 
     Parameters
     ----------
@@ -45,28 +45,31 @@ def exponential_stage(rotors, blades, parts, slope, k, stage):
     stage : lanes, shape (size,)
         Output.
     """
-    slopes, ending = as_lanes(parts.slopes, rotors), as_lanes(parts.end, rotors)
-    matrices, registers = as_lanes(parts.matrices, blades), as_lanes(parts.end_registers, blades)
-    begin = as_lanes(parts.begin_registers, blades)
-    for i in range(parts.places.size):
-        slopes[k, parts.positions[i]] = slope[parts.places[i]]
-    number = 0
+    slopes, end = as_lanes(parts.slopes, rotors), as_lanes(parts.end, rotors)
+    begin_registers, end_registers = as_lanes(parts.begin_registers, blades), as_lanes(parts.end_registers, blades)
+    matrices = as_lanes(parts.matrices, blades)
+    for i in range(parts.states.size):
+        slopes[k, parts.block_positions[i]] = slope[parts.states[i]]
+    element = 0  # of the matrices
     for block in range(parts.sizes.size):
         first = parts.starts[block]
         for register in range(parts.registers[block], parts.registers[block + 1]):
-            total = begin[register]
+            total = begin_registers[register]
             for m in range(k + 1):
-                factors, given = matrices[k * (k + 1) // 2 + m], slopes[m]
+                matrix, slope_m = matrices[k * (k + 1) // 2 + m], slopes[m]
                 for j in range(parts.sizes[block]):
-                    total = total + factors[number + j] * given[first + j]
-            registers[register] = total
-            number += parts.sizes[block]
-    for i in range(parts.places.size):
-        stage[parts.places[i]] = ending[parts.positions[i]]
+                    total = total + matrix[element + j] * slope_m[first + j]
+            end_registers[register] = total
+            element += parts.sizes[block]
+    for i in range(parts.states.size):
+        stage[parts.states[i]] = end[parts.block_positions[i]]
 
 
 def coefficients(linear: Array, h: float) -> Array:
-    """Coefficients of a step.
+    """Coefficients of a step, eq. (7.3) solved for the derivatives f_1 to f_4 of the stages.
+
+    With d_i = f_i - f_1 - L (y_i - y_1): the stages are y_2 = y_1 + a1 f_1, y_3 = y_1 + b1 f_1 + b2 f_2,
+    y_4 = y_1 + c1 f_1 + c2 f_2 + c3 f_3, and the new state is y_1 + new1 f_1 + new2 f_2 + new3 f_3 + new4 f_4.
 
     Parameters
     ----------
@@ -82,22 +85,22 @@ def coefficients(linear: Array, h: float) -> Array:
     """
     z, one = 0.5 * h * linear, np.eye(len(linear))
     doublings = 0
-    while np.abs(z).sum(axis=1).max() > SMALL:
+    while np.abs(z).sum(axis=1).max() > MAX_NORM:
         z, doublings = 0.5 * z, doublings + 1
     phi, half = np.zeros((4, *z.shape)), np.zeros((4, *z.shape))
-    phi_functions(np.ascontiguousarray(z), doublings, phi, half)
-    a1, whole = 0.5 * h * half[1], h * phi[1]
-    b2, c3 = h * half[2], 2.0 * h * phi[2]
-    inner, outer = h * (2.0 * phi[2] - 4.0 * phi[3]), h * (4.0 * phi[3] - phi[2])
-    # what of a derivative's difference from the first one L explains: of the second, third and fourth stage
+    set_phi_functions(np.ascontiguousarray(z), doublings, phi, half)
+    a1, first_order = 0.5 * h * half[1], h * phi[1]  # of f_1, where L explains all
+    b2, c3 = h * half[2], 2.0 * h * phi[2]  # of d_2 and d_3
+    inner, new4 = h * (2.0 * phi[2] - 4.0 * phi[3]), h * (4.0 * phi[3] - phi[2])  # of d_2 and d_3, of d_4
+    # f_1 + L (y_i - y_1) in terms of the derivatives: what is subtracted from f_2, f_3, f_4
     b1 = a1 - _times(b2, half[0])
     third1, third2 = one + _times(linear, b1), _times(linear, b2)
-    c1, c2 = whole - _times(c3, third1), -_times(c3, third2)
+    c1, c2 = first_order - _times(c3, third1), -_times(c3, third2)
     fourth1, fourth2, fourth3 = one + _times(linear, c1), _times(linear, c2), _times(linear, c3)
-    new1 = whole - _times(inner, half[0] + third1) - _times(outer, fourth1)
-    new2 = inner - _times(inner, third2) - _times(outer, fourth2)
-    new3 = inner - _times(outer, fourth3)
-    return np.stack([a1, b1, b2, c1, c2, c3, new1, new2, new3, outer])
+    new1 = first_order - _times(inner, half[0] + third1) - _times(new4, fourth1)
+    new2 = inner - _times(inner, third2) - _times(new4, fourth2)
+    new3 = inner - _times(new4, fourth3)
+    return np.stack([a1, b1, b2, c1, c2, c3, new1, new2, new3, new4])
 
 
 def _times(left: Array, right: Array) -> Array:
@@ -108,8 +111,8 @@ def _times(left: Array, right: Array) -> Array:
 
 
 @entry
-def phi_functions(z, doublings, phi, half):
-    """Fill phi with phi_0 .. phi_3 of 2^(doublings + 1) z, and `half` with those of half of that.
+def set_phi_functions(z, doublings, phi, half):
+    """Fill phi with phi_0 .. phi_3 of 2^(doublings + 1) z, and `half` with those of 2^doublings z.
 
     phi_3 is a series, the others follow from phi_k = 1/k! + z phi_k+1, and those of 2 z from those of z: N. J. Higham,
     Functions of Matrices, SIAM 2008, section 10.7.4; M. Hochbruck, A. Ostermann, Exponential integrators, Acta

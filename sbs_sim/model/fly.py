@@ -6,11 +6,11 @@ from sbs_sim.model.kernel import entry
 
 @entry
 def fly(
-    advance, derivative, working_state, model, x, psi0, step, steps, h, method, bounds, work, tick, culprit, swash,
+    advance, derivative, working_state, model, x, psi0, step, steps, h, method, bounds, work, tick, failed_state, swash,
     winds, ticks, offset, every, loaded, azimuths, air, states, forces, loads, first_look, watch, looks, look_air,
     working,
 ):  # fmt: skip
-    """Fly ticks one after another, and write down the first of every `every` ones.
+    """Fly ticks one after another, and record the first of every `every` ones.
 
     Parameters
     ----------
@@ -20,35 +20,35 @@ def fly(
         See `advance`; x is overwritten.
     step : ndarray of int64, shape (n,)
         Number of the step at the start; overwritten with that of the last good step of each flight.
-    culprit : ndarray of int64, shape (n,)
+    failed_state : ndarray of int64, shape (n,)
         See `advance`.
     swash : ndarray, shape (ticks, 3 n_rotors, n), or one more
         Swashplate angles of each tick [rad]; after the last tick of a flight they are those it ends with.
     winds : ndarray, shape (len(swash) or more, WIND_SIZE, n)
         Air of each tick.
     ticks : int
-        How many to fly.
+        Number of ticks to fly.
     offset : int
-        Ticks from the start until one is to be written down.
+        Ticks from the start to the first that is recorded.
     every : int
     loaded : bool
-        True writes down forces and loads too, which takes one more derivative.
+        True records forces and loads too, which takes one more derivative.
     azimuths : ndarray, shape (rows, n_rotors, n)
         [rad]
     air : ndarray, shape (rows, 3, n)
-        Velocity of the air at the times that are written down, NED [m/s].
+        Velocity of the air at the recorded times, NED [m/s].
     states, forces, loads : ndarray, shapes (rows, size, n), (rows, 3, n), (rows, 8 n_rotors, n)
-        Outputs: state, specific force of the c.g. [m/s^2], and see `Work`. Rows after the end of a flight are of no
+        Outputs: state, specific force of the c.g. [m/s^2], and see `Work`. Rows after the end of a flight have no
         meaning.
     first_look, watch : int
-        Ticks from the start until one whose working states are written down, and from one of these to the next.
+        Ticks from the start to the first of which working states are recorded, and from one of these to the next.
     looks, look_air : ndarray, shapes (n_looks, n_rotors, n), (n_looks, 3, n)
         Azimuths [rad] and velocity of the air [m/s] there.
     working : ndarray, shape (n_looks, n_rotors, WORKING_SIZE, n)
         Output: working states.
     """
     row, look, first = 0, 0, step[0]
-    done = tick.done
+    steps_done = tick.done
     for i in range(swash.shape[0]):
         if i == first_look + look * watch:
             derivative(model, x, swash[i], looks[look], look_air[look], work, tick.slopes[0], False)
@@ -58,16 +58,16 @@ def fly(
             copy_rows(x, states[row])
             if loaded:
                 derivative(model, x, swash[i], azimuths[row], air[row], work, tick.slopes[0], True)
-                copy_rows(work.vector[:3], forces[row])
+                copy_rows(work.acceleration_rows[:3], forces[row])
                 copy_rows(work.load_rows, loads[row])
             row += 1
         if i == ticks:
             return
         advance(derivative, model, x, swash[i], psi0, first + i * steps, steps, h, winds[i], method, bounds, work, tick,
-                done, culprit)  # fmt: skip
+                steps_done, failed_state)  # fmt: skip
         flying = False
-        for lane in range(culprit.size):
-            step[lane] += done[lane]
-            flying = flying or culprit[lane] == FLYING
+        for lane in range(failed_state.size):
+            step[lane] += steps_done[lane]
+            flying = flying or failed_state[lane] == FLYING
         if not flying:
             return

@@ -7,6 +7,7 @@ takes body components to earth components; R_NB is the same as a matrix.
 from __future__ import annotations  # `help` then shows types by their names
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -128,9 +129,19 @@ def hub_axes(shaft_direction: ArrayLike) -> Array:
     return np.array([[1.0 + xx, xy, axis_y], [xy, 1.0 + yy, -axis_x], [-axis_y, axis_x, 1.0 - sine_squared * share]])
 
 
+class Quaternion(NamedTuple):
+    """Attitude, body to earth; the vector part is x, y, z."""
+
+    w: Any
+    x: Any
+    y: Any
+    z: Any
+
+
 @kernel
-def rotation(w, x, y, z):
-    """R_NB of a unit quaternion in lanes: `rotation @ body` is in earth axes, `transposed(it) @ earth` in body's."""
+def rotation(attitude):
+    """R_NB of a unit quaternion, eq. (1.1): `R_NB @ body` has earth axes, `transposed(R_NB) @ earth` body axes."""
+    w, x, y, z = attitude
     return Matrix(
         Vector(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
         Vector(2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
@@ -139,8 +150,14 @@ def rotation(w, x, y, z):
 
 
 @kernel
-def quaternion_rates(w, x, y, z, rates):
-    """Time derivative of the attitude quaternion for body rates [rad/s]."""
-    vector = Vector(x, y, z)
-    turning = rates * w + cross(vector, rates)
-    return -0.5 * dot(vector, rates), 0.5 * turning.x, 0.5 * turning.y, 0.5 * turning.z
+def quaternion_rates(attitude, omega):
+    """Time derivative of the attitude quaternion for the body's angular velocity [rad/s], eq. (1.2)."""
+    vector = Vector(attitude.x, attitude.y, attitude.z)
+    turning = omega * attitude.w + cross(vector, omega)
+    return Quaternion(-0.5 * dot(vector, omega), 0.5 * turning.x, 0.5 * turning.y, 0.5 * turning.z)
+
+
+@kernel
+def shaft_down(hub_axes):
+    """z_h in body axes: the unit vector along the shaft against the thrust, third column of the hub axes."""
+    return Vector(hub_axes.x.z, hub_axes.y.z, hub_axes.z.z)

@@ -3,9 +3,10 @@
 The model knows nothing of a fuselage's shape: what can touch are the centre of gravity and the rims of the rotor discs.
 """
 
-from sbs_sim.lanes import Vector, as_lanes, as_records, dot, greatest, sqrt
-from sbs_sim.model.frames import rotation
+from sbs_sim.lanes import as_lanes, as_records, dot, greatest, sqrt
+from sbs_sim.model.frames import rotation, shaft_down
 from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.state import DOWN, attitude_at
 
 
 @entry
@@ -21,18 +22,17 @@ def lowest_point(rotors, x, out):
         Output.
     """
     records = as_records(rotors)
-    as_lanes(out, records)[0] = lowest(records, as_lanes(x, records))
+    as_lanes(out, records)[0] = lowest_down_coordinate(records, as_lanes(x, records))
 
 
 @kernel
-def lowest(rotors, x):
-    """What `lowest_point` gives, for compiled callers."""
-    down = rotation(x[3], x[4], x[5], x[6]).z  # the direction down in body axes
-    deepest = x[2]
+def lowest_down_coordinate(rotors, x):
+    """Down coordinate of the lowest point of the aircraft [m], eq. (7.9)."""
+    down = rotation(attitude_at(x)).z  # the direction down in body axes
+    lowest_down = x[DOWN]
     for j in range(rotors.shape[0]):
         rotor = rotors[j]
-        shaft = Vector(rotor.axes.x.z, rotor.axes.y.z, rotor.axes.z.z)
-        upright = dot(down, shaft)  # cosine of the shaft's angle to the vertical
-        rim = rotor.radius * sqrt(greatest(1.0 - upright * upright, 0.0))
-        deepest = greatest(deepest, x[2] + dot(down, rotor.hub) + rim)
-    return deepest
+        cosine = dot(down, shaft_down(rotor.axes))  # of the shaft's angle to the vertical
+        rim = rotor.radius * sqrt(greatest(1.0 - cosine * cosine, 0.0))  # below the hub
+        lowest_down = greatest(lowest_down, x[DOWN] + dot(down, rotor.hub) + rim)
+    return lowest_down

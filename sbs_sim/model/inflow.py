@@ -9,75 +9,97 @@ from typing import Any, NamedTuple
 
 from sbs_sim.lanes import Vector, as_lanes, as_records, cross, dot, select, sqrt
 from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.state import COSINE, SINE, UNIFORM, vector_at
 
 INVERSE_MASS = 3.0 * math.pi / 8.0  # 1 / M_0, of the apparent mass
 INVERSE_INERTIA = 45.0 * math.pi / 16.0  # 1 / M_1
 SKEW = 15.0 * math.pi / 64.0
 # Total flow through the disc is never less than this share of the tip speed (1.3 mm/s here): it keeps the
 # inflow equations finite where the flow through the disc vanishes, and changes the hover flow by 2e-8.
-LEAST_FLOW = 1e-5
+MIN_FLOW = 1e-5
+
+
+class Inflow(NamedTuple):
+    """A value for each inflow state: of lambda0, lambdac, lambdas, or of what drives them."""
+
+    uniform: Any
+    cosine: Any
+    sine: Any
 
 
 class DiscFlow(NamedTuple):
-    """V_T, V_m of eq. (6.3), and the skew of the wake along x and y, of the present flow through the disc."""
+    """Flow through a disc, over the tip speed.
 
-    total: Any
+    Attributes
+    ----------
+    uniform, cyclic : lanes
+        V_T and V_m of eq. (6.3).
+    skew_cosine, skew_sine : lanes
+        X_c and X_s of eq. (6.4): the skew of the wake.
+    """
+
+    uniform: Any
     cyclic: Any
-    skew_x: Any
-    skew_y: Any
+    skew_cosine: Any
+    skew_sine: Any
 
 
 @kernel
 def disc_flow(lambda0, mu, sense):
     """Flow through a disc; mu is the velocity of the hub relative to the air over the tip speed, hub axes."""
     through = lambda0 - mu.z
-    edgewise = mu.x * mu.x + mu.y * mu.y
-    total = sqrt(edgewise + through * through + LEAST_FLOW * LEAST_FLOW)
-    cyclic = (edgewise + through * (through + lambda0)) / total
+    edgewise_squared = mu.x * mu.x + mu.y * mu.y
+    total = sqrt(edgewise_squared + through * through + MIN_FLOW * MIN_FLOW)
+    cyclic = (edgewise_squared + through * (through + lambda0)) / total
     inverse = 1.0 / (total + abs(through))
     return DiscFlow(total, cyclic, mu.x * inverse, -(sense * mu.y * inverse))
 
 
 @kernel
 def inflow_rates(rotor, inflow, flow, loads, cyclic):
-    """Time derivatives of lambda0, lambdac, lambdas [1/s], eq. (6.1), linear in the inflow and in the loads.
+    """Time derivatives of the inflow [1/s], eq. (6.1), linear in the inflow and in the loads.
 
     Parameters
     ----------
     rotor : record ROTOR
-    inflow : Vector
-        lambda0, lambdac, lambdas.
+    inflow : Inflow
     flow : DiscFlow
-    loads : Vector
-        C_T and the coefficients m_c, m_s of the aerodynamic moments, where more lift aft (psi = 0) gives more inflow
-        aft.
+    loads : Inflow
+        C_T, m_c and m_s of eq. (6.2): more lift aft (psi = 0) gives more inflow aft.
     cyclic : int
         0 holds lambdac and lambdas.
+
+    Returns
+    -------
+    Inflow
     """
-    uniform_gain = 2.0 * rotor.duct * rotor.duct
-    driven = solve_gain(uniform_gain, flow.skew_x, flow.skew_y, inflow)
+    uniform_gain = 2.0 * rotor.duct_expansion * rotor.duct_expansion
+    driven = solve_gain(uniform_gain, flow.skew_cosine, flow.skew_sine, inflow)
     # without its cyclic parts the uniform inflow follows Glauert's single equation
-    uniform = select(cyclic == 1, driven.x, inflow.x / uniform_gain)
-    inertia = rotor.speed * INVERSE_INERTIA
-    return Vector(
-        rotor.speed * INVERSE_MASS * (loads.x - flow.total * uniform),
-        select(cyclic == 1, inertia * (loads.y - flow.cyclic * driven.y), 0.0),
-        select(cyclic == 1, inertia * (loads.z - flow.cyclic * driven.z), 0.0),
+    uniform = select(cyclic == 1, driven.uniform, inflow.uniform / uniform_gain)
+    inverse_inertia = rotor.rotor_speed * INVERSE_INERTIA
+    return Inflow(
+        rotor.rotor_speed * INVERSE_MASS * (loads.uniform - flow.uniform * uniform),
+        select(cyclic == 1, inverse_inertia * (loads.cosine - flow.cyclic * driven.cosine), 0.0),
+        select(cyclic == 1, inverse_inertia * (loads.sine - flow.cyclic * driven.sine), 0.0),
     )
 
 
 @kernel
-def solve_gain(uniform_gain, skew_x, skew_y, b):
-    """Solve Lt y = b in the order (0, c, s), Lt of theory.md section 6, by Cramer's rule."""
-    ring = 2.0 * (1.0 + skew_x * skew_x + skew_y * skew_y)
-    mixed = -4.0 * skew_x * skew_y
-    first = Vector(uniform_gain, SKEW * skew_x, SKEW * skew_y)
-    second = Vector(-SKEW * skew_x, ring - 4.0 * skew_x * skew_x, mixed)
-    third = Vector(-SKEW * skew_y, mixed, ring - 4.0 * skew_y * skew_y)
+def solve_gain(uniform_gain, skew_cosine, skew_sine, inflow):
+    """Solve Lt y = inflow, Lt of eq. (6.5), by Cramer's rule."""
+    right = Vector(inflow.uniform, inflow.cosine, inflow.sine)
+    across = 2.0 * (1.0 + skew_cosine * skew_cosine + skew_sine * skew_sine)
+    mixed = -4.0 * skew_cosine * skew_sine
+    first = Vector(uniform_gain, SKEW * skew_cosine, SKEW * skew_sine)  # columns of Lt
+    second = Vector(-SKEW * skew_cosine, across - 4.0 * skew_cosine * skew_cosine, mixed)
+    third = Vector(-SKEW * skew_sine, mixed, across - 4.0 * skew_sine * skew_sine)
     minors = cross(second, third)
     inverse = 1.0 / dot(first, minors)
-    return Vector(
-        dot(b, minors) * inverse, dot(b, cross(third, first)) * inverse, dot(b, cross(first, second)) * inverse
+    return Inflow(
+        dot(right, minors) * inverse,
+        dot(right, cross(third, first)) * inverse,
+        dot(right, cross(first, second)) * inverse,
     )
 
 
@@ -101,9 +123,9 @@ def inflow_matrix(rotors, number, lambda0, mu, cyclic, out):
     rotor = as_records(rotors)[number]
     velocity, matrix = as_lanes(mu, rotor), as_lanes(out, rotor)
     uniform = as_lanes(lambda0, rotor)[0]
-    flow = disc_flow(uniform, Vector(velocity[0], velocity[1], velocity[2]), rotor.sense)
-    none = Vector(0.0, 0.0, 0.0)
+    flow = disc_flow(uniform, vector_at(velocity, 0), rotor.sense)
+    none = Inflow(0.0, 0.0, 0.0)
     for i in range(3):
-        unit = Vector(1.0 * (i == 0), 1.0 * (i == 2), 1.0 * (i == 1))
+        unit = Inflow(1.0 * (i == UNIFORM), 1.0 * (i == COSINE), 1.0 * (i == SINE))
         rates = inflow_rates(rotor, unit, flow, none, cyclic)
-        matrix[0, i], matrix[1, i], matrix[2, i] = rates.x, rates.z, rates.y
+        matrix[UNIFORM, i], matrix[SINE, i], matrix[COSINE, i] = rates.uniform, rates.sine, rates.cosine

@@ -6,21 +6,22 @@ import numpy as np
 
 from sbs_sim.lanes import all_lanes, any_lane, as_lanes, as_records, floor, greatest, least, sqrt
 from sbs_sim.model.exponential import begin_exponential_step, exponential_stage
-from sbs_sim.model.ground import lowest
+from sbs_sim.model.frames import Quaternion
+from sbs_sim.model.ground import lowest_down_coordinate
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_rotation_terms
-from sbs_sim.model.state import BODY_SIZE
+from sbs_sim.model.state import BODY_SIZE, attitude_at, set_attitude
 from sbs_sim.model.wind import wind_at
 
 RK4, PARTITIONED, TSIT5, ETD = range(4)
-MOST_STAGES = 6
+MAX_STAGES = 6
 TURN, INVERSE_TURN = 2.0 * math.pi, 1.0 / (2.0 * math.pi)
-FLYING = -1  # no state is to blame for an end
+FLYING = -1  # in place of a failed state
 
 
 def _tableau(*rows):
-    """Butcher's tableau: coefficients of the stages, filled up with zeros, and the weights in the last row."""
-    table = np.zeros((MOST_STAGES + 1, MOST_STAGES))
+    """Butcher's tableau: coefficients of the stages, padded with zeros, and the weights in the last row."""
+    table = np.zeros((MAX_STAGES + 1, MAX_STAGES))
     for i, row in enumerate(rows[:-1]):
         table[i, : len(row)] = row
     table[-1, : len(rows[-1])] = rows[-1]
@@ -44,8 +45,9 @@ STAGES = np.array([4, 4, 6, 4])
 
 
 @entry
-def advance(derivative, model, x, swash, psi0, first_step, steps, h, wind, method, bounds, work, tick, done, culprit):
-    """Advance flights by a tick of `steps` steps; each is left at the last step that was plausible.
+def advance(derivative, model, x, swash, psi0, first_step, steps, h, wind, method, bounds, work, tick, steps_done,
+            failed_state):  # fmt: skip
+    """Advance flights by a tick of `steps` steps; each stops at its last plausible state.
 
     Parameters
     ----------
@@ -70,23 +72,23 @@ def advance(derivative, model, x, swash, psi0, first_step, steps, h, wind, metho
     work : Work
     tick : Tick
         Memory.
-    done : ndarray of int64, shape (n,)
-        Output: steps made; fewer than `steps` if the next one would leave the plausible.
-    culprit : ndarray of int64, shape (n,)
-        -1 for flights that go on; others stay as they are. Overwritten with the index of the state that would leave the
-        plausible, `size` where the aircraft would touch the ground.
+    steps_done : ndarray of int64, shape (n,)
+        Output: steps made; fewer than `steps` if the next state is not plausible.
+    failed_state : ndarray of int64, shape (n,)
+        `FLYING` for flights to advance; others stay as they are. Output: index of the state that is beyond its bound
+        or not a number, `size` where the aircraft touches the ground.
     """
-    for lane in range(culprit.size):
-        done[lane] = 0
+    for lane in range(failed_state.size):
+        steps_done[lane] = 0
     for i in range(steps):
         make_step(
             derivative, model, x, swash, psi0, first_step + i, h, wind, i / steps, 1.0 / steps, method, work, tick
         )
-        if all_plausible(model, tick.stage, bounds, culprit):
+        if all_plausible(model, tick.stage, bounds, failed_state):
             copy_rows(tick.stage, x)
-            for lane in range(culprit.size):
-                done[lane] = i + 1
-        elif not take_lanes(model, x, tick, bounds, i, done, culprit):
+            for lane in range(failed_state.size):
+                steps_done[lane] = i + 1
+        elif not accept_plausible(model, x, tick, bounds, i, steps_done, failed_state):
             return
 
 
@@ -113,14 +115,20 @@ def make_step(derivative, model, x, swash, psi0, number, h, wind, fraction, shar
             exponential_stage(rotors, as_records(model.blades), tick.exponential, slopes[k], k, stage)
     if method != ETD:
         combine(state, slopes, tableau[-1], count, h, state.shape[0], stage)
-    w, a, b, c = stage[3], stage[4], stage[5], stage[6]
-    shrink = 1.0 / sqrt(w * w + a * a + b * b + c * c)
-    stage[3], stage[4], stage[5], stage[6] = w * shrink, a * shrink, b * shrink, c * shrink
+    normalize_attitude(stage)
+
+
+@kernel
+def normalize_attitude(x):
+    """Give the quaternion of a state unit length."""
+    q = attitude_at(x)
+    scale = 1.0 / sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z)
+    set_attitude(x, Quaternion(q.w * scale, q.x * scale, q.y * scale, q.z * scale))
 
 
 @kernel
 def node(factors, count):
-    """Where a stage is in its step, as a share of it."""
+    """Time of a stage within its step, as a fraction of the step."""
     ahead = 0.0
     for m in range(count):
         ahead += factors[m]
@@ -129,7 +137,7 @@ def node(factors, count):
 
 @kernel
 def combine(state, slopes, factors, count, h, size, stage):
-    """Set so many states of the stage to the state plus h times a sum of the first slopes."""
+    """Set the first `size` states of a stage to the state plus h times the sum of factors times slopes."""
     for i in range(size):
         stage[i] = state[i]
     for m in range(count):
@@ -142,16 +150,16 @@ def combine(state, slopes, factors, count, h, size, stage):
 
 @kernel
 def set_azimuths(rotors, start, time, psi):
-    """Azimuths of all rotors a time after step 0, within 0 and 2 pi."""
+    """Set the azimuths of all rotors a time after step 0 [s], from 0 to 2 pi."""
     for j in range(rotors.shape[0]):
-        angle = start[j] + rotors[j].speed * time
-        # the whole turns are rounded too: what is left may be beyond an end by a last bit of the angle
+        angle = start[j] + rotors[j].rotor_speed * time
+        # the full turns are rounded too: the remainder may exceed an end by the last bit of the angle
         psi[j] = least(greatest(angle - TURN * floor(angle * INVERSE_TURN), 0.0), TURN)
 
 
 @entry
 def azimuths_at(rotors, start, times, out):
-    """What `set_azimuths` gives at some times.
+    """Azimuths of all rotors at some times.
 
     Parameters
     ----------
@@ -171,70 +179,74 @@ def azimuths_at(rotors, start, times, out):
 
 @kernel
 def copy_rows(source, target):
-    """Copy numbers one by one: a slice would be allocated."""
+    """Copy an array element by element: a slice would allocate."""
     for i in range(source.shape[0]):
         for lane in range(source.shape[1]):
             target[i, lane] = source[i, lane]
 
 
 @kernel
-def freeze_forcing(switches, rotors, state, stage, first, slope):
+def freeze_forcing(switches, rotors, state, stage, first_slope, slope):
     """Rotor accelerations of the paper's Figure 3: only K1 q' + K0 q follow the stage.
 
-    The coupling and forcing terms C1, C0, E of eqs. [13] and [14] keep their values of the previous time step,
-    that is, what is left of its accelerations without the turning of the coordinates.
+    The coupling and forcing terms C1, C0, E of eqs. [13] and [14] keep their values of the previous time step: its
+    accelerations less the terms of the rotating coordinates.
     """
     for j in range(rotors.shape[0]):
         rotor = rotors[j]
         for i in range(rotor.blades):
-            slope[rotor.flap_rate + i] = first[rotor.flap_rate + i]
-            slope[rotor.lag_rate + i] = first[rotor.lag_rate + i]
-        lags = 1.0 * switches.lead_lag
+            slope[rotor.flap_rate + i] = first_slope[rotor.flap_rate + i]
+            slope[rotor.lag_rate + i] = first_slope[rotor.lag_rate + i]
+        lead_lag = 1.0 * switches.lead_lag
         add_rotation_terms(rotor, state, slope, rotor.flap, rotor.flap_rate, -1.0)
         add_rotation_terms(rotor, stage, slope, rotor.flap, rotor.flap_rate, 1.0)
-        add_rotation_terms(rotor, state, slope, rotor.lag, rotor.lag_rate, -lags)
-        add_rotation_terms(rotor, stage, slope, rotor.lag, rotor.lag_rate, lags)
+        add_rotation_terms(rotor, state, slope, rotor.lag, rotor.lag_rate, -lead_lag)
+        add_rotation_terms(rotor, stage, slope, rotor.lag, rotor.lag_rate, lead_lag)
 
 
 @kernel
-def all_plausible(model, x, bounds, culprit):
-    """True if all flights go on and no state is beyond its bound, or not a number, and nobody touches the ground."""
-    for lane in range(culprit.size):
-        if culprit[lane] != FLYING:
+def all_plausible(model, x, bounds, failed_state):
+    """True if all flights go on, no state is beyond its bound or not a number, and no aircraft touches the ground."""
+    for lane in range(failed_state.size):
+        if failed_state[lane] != FLYING:
             return False
     rotors = as_records(model.rotors)
     state, bound = as_lanes(x, rotors), as_lanes(bounds, rotors)
-    fine = abs(state[0]) <= bound[0]
+    plausible = abs(state[0]) <= bound[0]
     for i in range(1, x.shape[0]):
-        fine = fine & (abs(state[i]) <= bound[i])
+        plausible = plausible & (abs(state[i]) <= bound[i])
     ground = bound[x.shape[0]]
     if any_lane(ground < math.inf):
-        fine = fine & (lowest(rotors, state) < ground)
-    return all_lanes(fine)
+        plausible = plausible & (lowest_down_coordinate(rotors, state) < ground)
+    return all_lanes(plausible)
 
 
 @kernel
-def take_lanes(model, x, tick, bounds, step, done, culprit):
-    """Take over the new states of the flights that go on, and say why others do not; False if none goes on."""
-    size, flying = x.shape[0], False
+def accept_plausible(model, x, tick, bounds, step, steps_done, failed_state):
+    """Accept the new states that are plausible, and name the failed state of the others; False if no flight goes on."""
+    size, any_flying = x.shape[0], False
     rotors = as_records(model.rotors)
-    deepest = as_lanes(tick.deepest, rotors)
-    deepest[0] = lowest(rotors, as_lanes(tick.stage, rotors))
-    for lane in range(culprit.size):
-        if culprit[lane] != FLYING:
+    as_lanes(tick.lowest_point, rotors)[0] = lowest_down_coordinate(rotors, as_lanes(tick.stage, rotors))
+    for lane in range(failed_state.size):
+        if failed_state[lane] != FLYING:
             continue
-        for i in range(size):
-            if not abs(tick.stage[i, lane]) <= bounds[i, lane]:
-                culprit[lane] = i
-                break
-        if culprit[lane] == FLYING and tick.deepest[0, lane] >= bounds[size, lane]:
-            culprit[lane] = size
-        if culprit[lane] == FLYING:
-            flying = True
-            done[lane] = step + 1
+        failed_state[lane] = first_failed_state(tick, bounds, lane)
+        if failed_state[lane] == FLYING:
+            any_flying = True
+            steps_done[lane] = step + 1
             for i in range(size):
                 x[i, lane] = tick.stage[i, lane]
         else:
             for i in range(size):
                 tick.last[i, lane] = tick.stage[i, lane]
-    return flying
+    return any_flying
+
+
+@kernel
+def first_failed_state(tick, bounds, lane):
+    """Index of the first state of a flight that is not plausible, `size` for the ground, else `FLYING`."""
+    size = tick.stage.shape[0]
+    for i in range(size):
+        if not abs(tick.stage[i, lane]) <= bounds[i, lane]:
+            return i
+    return size if tick.lowest_point[0, lane] >= bounds[size, lane] else FLYING

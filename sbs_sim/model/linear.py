@@ -1,7 +1,8 @@
 """Outputs of the model as functions of linear states and controls, and their differences (theory.md section 9)."""
 
-from sbs_sim.lanes import as_lanes, as_records
+from sbs_sim.lanes import Vector, as_lanes, as_records
 from sbs_sim.model import state as S
+from sbs_sim.model.frames import Quaternion
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.mixing import mix
 from sbs_sim.model.trigonometry import cosine_sine
@@ -44,7 +45,7 @@ def jacobian(derivative, model, point, mixing, steps, owners, psi, work, tick, i
         begin = 0
         for owner in range(rotors + 1):
             blades = model.rotors[owner]["blades"] if owner < rotors else 0
-            column, whole = next_column(steps, owners, owner, 0), True
+            column, first_pass = next_column(steps, owners, owner, 0), True
             while column < point.size:
                 count = 0
                 while count < half // azimuths and column < point.size:
@@ -52,10 +53,10 @@ def jacobian(derivative, model, point, mixing, steps, owners, psi, work, tick, i
                     count += 1
                     column = next_column(steps, owners, owner, column + 1)
                 set_pairs(point, steps, psi, first, azimuths, columns, count, inputs, tick.psi)
-                if owner < rotors and not whole:
+                if owner < rotors and not first_pass:
                     work.span[0], work.span[1] = begin, begin + blades
                 evaluate_inputs(derivative, model, inputs, mixing, work, tick)
-                whole = False
+                first_pass = False
                 for pair in range(count * azimuths):
                     k, changed = first + pair % azimuths, columns[pair // azimuths]
                     gather_outputs(tick, work, 2 * pair, values[0])
@@ -75,8 +76,8 @@ def next_column(steps, owners, owner, column):
 
 
 @kernel
-def set_pairs(point, steps, psi, first, azimuths, columns, count, inputs, places):
-    """Inputs of lanes by twos: one column after the other, each at all azimuths from `first` on; the last fill up.
+def set_pairs(point, steps, psi, first, azimuths, columns, count, inputs, lane_psi):
+    """Inputs of pairs of lanes: one column after the other, each at all azimuths from `first` on; the last repeats.
 
     The azimuth of a lane does not depend on the columns.
     """
@@ -87,7 +88,7 @@ def set_pairs(point, steps, psi, first, azimuths, columns, count, inputs, places
             inputs[i, lane] = point[i]
         inputs[column, lane] = point[column] + (1.0 - 2.0 * (lane % 2)) * steps[column]
         for j in range(psi.shape[1]):
-            places[j, lane] = psi[first + pair % azimuths, j]
+            lane_psi[j, lane] = psi[first + pair % azimuths, j]
 
 
 @kernel
@@ -110,10 +111,10 @@ def set_state(point, x):
     """Simulation state at the origin, heading north, of a linear state."""
     cp, sp = cosine_sine(0.5 * point[S.LINEAR_THETA])
     cr, sr = cosine_sine(0.5 * point[S.LINEAR_PHI])
-    x[0] = x[1] = x[2] = 0.0
-    x[3], x[4], x[5], x[6] = cr * cp, sr * cp, cr * sp, -(sr * sp)
-    x[7], x[8], x[9] = point[S.LINEAR_U], point[S.LINEAR_V], point[S.LINEAR_W]
-    x[10], x[11], x[12] = point[S.LINEAR_P], point[S.LINEAR_Q], point[S.LINEAR_R]
+    S.set_vector(x, S.POSITION, Vector(0.0, 0.0, 0.0))
+    S.set_attitude(x, Quaternion(cr * cp, sr * cp, cr * sp, -(sr * sp)))
+    S.set_vector(x, S.VELOCITY, Vector(point[S.LINEAR_U], point[S.LINEAR_V], point[S.LINEAR_W]))
+    S.set_vector(x, S.RATES, Vector(point[S.LINEAR_P], point[S.LINEAR_Q], point[S.LINEAR_R]))
     for i in range(S.BODY_SIZE, x.shape[0]):
         x[i] = point[i - S.BODY_SIZE + S.LINEAR_BODY_SIZE]
 
@@ -124,8 +125,10 @@ def linear_rates(point, dx, out):
     ct, st = cosine_sine(point[S.LINEAR_THETA])
     cp, sp = cosine_sine(point[S.LINEAR_PHI])
     q, r = point[S.LINEAR_Q], point[S.LINEAR_R]
-    out[S.LINEAR_U], out[S.LINEAR_V], out[S.LINEAR_W] = dx[7], dx[8], dx[9]
-    out[S.LINEAR_P], out[S.LINEAR_Q], out[S.LINEAR_R] = dx[10], dx[11], dx[12]
+    velocity_rate, angular_acceleration = S.vector_at(dx, S.VELOCITY), S.vector_at(dx, S.RATES)
+    out[S.LINEAR_U], out[S.LINEAR_V], out[S.LINEAR_W] = velocity_rate.x, velocity_rate.y, velocity_rate.z
+    out[S.LINEAR_P], out[S.LINEAR_Q] = angular_acceleration.x, angular_acceleration.y
+    out[S.LINEAR_R] = angular_acceleration.z
     # Euler kinematics, e.g. Stevens and Lewis, Aircraft Control and Simulation, section 1.4
     out[S.LINEAR_THETA] = q * cp - r * sp
     out[S.LINEAR_PHI] = point[S.LINEAR_P] + st / ct * (q * sp + r * cp)
@@ -140,6 +143,6 @@ def gather_outputs(tick, work, lane, row):
     for i in range(size):
         row[i] = tick.slopes[2, i, lane]
     for i in range(SPECIFIC_FORCE_SIZE):
-        row[size + i] = work.vector[i, lane]
+        row[size + i] = work.acceleration_rows[i, lane]
     for i in range(work.load_rows.shape[0]):
         row[size + SPECIFIC_FORCE_SIZE + i] = work.load_rows[i, lane]

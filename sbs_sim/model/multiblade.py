@@ -51,7 +51,7 @@ def blade_angle(x, angles, rates, blade, cosine, sine):
     x : lanes, shape (size + 1,)
         State, and a zero.
     angles, rates : ndarray of int64, shape (coordinates, quads)
-        See `sbs_sim.model.records.Places`.
+        See `sbs_sim.model.records.StateIndices`.
     blade : record BLADE
     cosine, sine : lanes
         Of the azimuths of the blades.
@@ -63,7 +63,7 @@ def blade_angle(x, angles, rates, blade, cosine, sine):
         a, b = spread(x, angles[2 * n - 1], quad, blade), spread(x, angles[2 * n], quad, blade)
         a_rate, b_rate = spread(x, rates[2 * n - 1], quad, blade), spread(x, rates[2 * n], quad, blade)
         angle = angle - a * cn - b * sn
-        rate = rate + n * blade.speed * (a * sn - b * cn) - a_rate * cn - b_rate * sn
+        rate = rate + n * blade.rotor_speed * (a * sn - b * cn) - a_rate * cn - b_rate * sn
         cn, sn = cn * cosine - sn * sine, sn * cosine + cn * sine
     return (
         angle + blade.alternation * spread(x, angles[last], quad, blade),
@@ -76,13 +76,13 @@ def add_accelerations(blade, terms, means, harmonics):
     """Add the accelerations of blades to the sums over their quads that the means of eq. (1.9) are made of."""
     flap, lag = terms.flap_acceleration, terms.lag_acceleration
     add_to_quads(
-        means, blade.quad, blade.begins, "flap", (flap, lag, flap * blade.alternation, lag * blade.alternation)
+        means, blade.quad, blade.starts_quad, "flap", (flap, lag, flap * blade.alternation, lag * blade.alternation)
     )
     cosine, sine = terms.cosine, terms.sine
     cn, sn = cosine, sine
     for n in range(1, blade.harmonics + 1):
         add_to_quads(
-            harmonics[n - 1], blade.quad, blade.begins, "flap_cosine", (flap * cn, flap * sn, lag * cn, lag * sn)
+            harmonics[n - 1], blade.quad, blade.starts_quad, "flap_cosine", (flap * cn, flap * sn, lag * cn, lag * sn)
         )
         cn, sn = cn * cosine - sn * sine, sn * cosine + cn * sine
 
@@ -121,7 +121,7 @@ def add_rotation_terms(rotor, x, dx, angles, rates, factor):
     """
     for n in range(1, rotor.harmonics + 1):
         i = 2 * n - 1
-        harmonic = n * rotor.speed
+        harmonic = n * rotor.rotor_speed
         a, b = x[angles + i], x[angles + i + 1]
         a_rate, b_rate = x[rates + i], x[rates + i + 1]
         dx[rates + i] = dx[rates + i] + factor * harmonic * (harmonic * a - 2.0 * b_rate)

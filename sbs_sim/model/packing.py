@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.model.kernel import target
-from sbs_sim.model.records import BLADE, ELEMENT, QUAD, Model, Places, aligned
+from sbs_sim.model.records import BLADE, ELEMENT, QUAD, Model, StateIndices, aligned
 
 WIDE = "avx512f"  # what a processor has that holds eight numbers in a register
 
@@ -28,7 +28,7 @@ def side_by_side(models: Sequence[Model]) -> Model:
     Parameters
     ----------
     models : sequence of Model
-        Of single aircraft with a single lane, see `Aircraft.model`. What they have in common, whole numbers and airfoil
+        Of single aircraft with a single lane, see `Aircraft.model`. What they have in common, integers and airfoil
         tables, is taken from the first.
     """
     first = models[0]
@@ -40,7 +40,7 @@ def side_by_side(models: Sequence[Model]) -> Model:
     return first._replace(**joined)
 
 
-SHARED = ("places", "table")
+SHARED = ("indices", "table")
 
 
 def _joined(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
@@ -85,9 +85,9 @@ def by_blades(model: Model, width: int) -> Model:
         _fill_register(model, register, blades[r], elements[r])
         for lane, number in enumerate(_with_copies(register)):
             knots[r, :, lane], stall[r, ..., lane] = model.knots[number, :, 0], model.stall[number, ..., 0]
-        blades[r]["quad"], blades[r]["begins"], blades[r]["elements"] = r * width // QUAD, 1, r
-    places = Places(*(_padded(part, len(quads)) for part in model.places))
-    return model._replace(blades=blades, elements=elements, knots=knots, places=places, stall=stall)
+        blades[r]["quad"], blades[r]["starts_quad"], blades[r]["elements"] = r * width // QUAD, 1, r
+    indices = StateIndices(*(_padded(part, len(quads)) for part in model.indices))
+    return model._replace(blades=blades, elements=elements, knots=knots, indices=indices, stall=stall)
 
 
 def _with_copies(register: Sequence[int | None]) -> list[int]:
@@ -113,7 +113,7 @@ def _quads(model: Model) -> list[list[int | None]]:
 
 # What a blade weighs nothing by, and makes no force by.
 WEIGHTLESS = (
-    *("mass", "first", "second_hub", "inverse_second", "flap_spring", "lag_spring", "lag_damping"),
+    *("mass", "first_moment", "hub_second_moment", "inverse_second_moment", "flap_spring", "lag_spring", "lag_damping"),
     *("lead_lag", "alternation"),
 )
 
@@ -132,6 +132,6 @@ def _fill_register(model: Model, register: Sequence[int | None], blade: Any, ele
 
 
 def _padded(part: NDArray[Any], quads: int) -> NDArray[Any]:
-    """Places of more quads than there are: those of the last."""
+    """Indices for more quads than there are: those of the last repeated."""
     missing = quads - part.shape[-1]
     return np.concatenate([part, np.repeat(part[..., -1:], missing, axis=-1)], axis=-1)

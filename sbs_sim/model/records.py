@@ -1,4 +1,4 @@
-"""What the compiled model knows of aircraft, and its memory: records with names, lane by lane.
+"""Data and memory of the compiled model: records with named fields, lane by lane.
 
 A record holds values of n aircraft side by side, see `sbs_sim.lanes.memory`. What belongs to blades has `width` lanes:
 n where the lanes are flights, more where a single flight has its blades for lanes.
@@ -12,118 +12,125 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.model.state import BODY_SIZE
+
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-LANES, VECTOR, MATRIX, WHOLE = (), (3,), (3, 3), None
+LANES, VECTOR, MATRIX, INTEGER = (), (3,), (3, 3), None
 LINE = 64  # bytes of a cache line
-QUAD = 4  # blades that are summed up first, see `sbs_sim.lanes.memory`
+QUAD = 4  # blades that are summed first, see `sbs_sim.lanes.memory`
 
 AIR = {"density": LANES, "inverse_viscosity": LANES, "gravity": LANES, "plate_areas": VECTOR}
-# the rigid part: the fuselage without blades (`complete` coupling), or the whole aircraft (`paper`); about the c.g.
+# the rigid part, about the c.g.: the fuselage without blades (`complete` coupling), or all of the aircraft (`paper`)
 BODY = {"mass": LANES, "first_moment": VECTOR, "inertia": MATRIX}
-SWITCHES = {"lead_lag": WHOLE, "cyclic_inflow": WHOLE, "complete_coupling": WHOLE, "complete_hub_moment": WHOLE}
+SWITCHES = {"lead_lag": INTEGER, "cyclic_inflow": INTEGER, "complete_coupling": INTEGER, "complete_hub_moment": INTEGER}
 ROTOR = {
-    "speed": LANES,  # Omega
+    "rotor_speed": LANES,  # Omega
     "radius": LANES,  # R
     "sense": LANES,  # G, +1 counter-clockwise seen from above
     "hub": VECTOR,
     "axes": MATRIX,  # hub axes as columns in body components
-    "duct": LANES,  # a_w
+    "duct_expansion": LANES,  # a_w
     "inverse_tip_speed": LANES,
-    "load_scale": LANES,  # of C_T: 1 / (rho pi R^2 (Omega R)^2), 0 in vacuum
+    "coefficient_scale": LANES,  # of C_T: 1 / (rho pi R^2 (Omega R)^2), 0 in vacuum
     "inverse_blades": LANES,  # 1 / N_b
-    "blades": WHOLE,  # N_b
-    "harmonics": WHOLE,
-    "first_quad": WHOLE,
-    "quads": WHOLE,
-    "flap": WHOLE,  # places of the first coordinate in the state
-    "flap_rate": WHOLE,
-    "lag": WHOLE,
-    "lag_rate": WHOLE,
-    "inflow": WHOLE,
+    "blades": INTEGER,  # N_b
+    "harmonics": INTEGER,
+    "first_quad": INTEGER,
+    "quads": INTEGER,
+    "flap": INTEGER,  # indices in the state of the first coordinate
+    "flap_rate": INTEGER,
+    "lag": INTEGER,
+    "lag_rate": INTEGER,
+    "inflow": INTEGER,
 }
 BLADE = {
-    "speed": LANES,
+    "rotor_speed": LANES,
     "sense": LANES,
     "radius": LANES,
     "hub": VECTOR,
     "axes": MATRIX,
-    "hinge": LANES,  # e_0
-    "lag_hinge": LANES,  # e_L = e_0 - e_F
-    "flap_hinge": LANES,  # e_F
+    "hinge_offset": LANES,  # e_0
+    "lag_hinge_offset": LANES,  # e_L = e_0 - e_F
+    "flap_hinge_offset": LANES,  # e_F
     "mass": LANES,  # m_b
-    "first": LANES,  # S_1
-    "second": LANES,  # A_1 in the equations of the blade
-    "second_hub": LANES,  # A_1 in the loads on the hub
-    "inverse_second": LANES,  # 0 for what fills up a quad
+    "first_moment": LANES,  # S_1
+    "second_moment": LANES,  # A_1 in the equations of the blade
+    "hub_second_moment": LANES,  # A_1 in the loads on the hub
+    "inverse_second_moment": LANES,  # 0 for what fills up a quad
     "flap_spring": LANES,
     "lag_spring": LANES,
     "lag_damping": LANES,
-    "pitch_flap": LANES,
-    "pitch_lag": LANES,
+    "pitch_flap_coupling": LANES,
+    "pitch_lag_coupling": LANES,
     "cos_phase": LANES,  # of the swashplate
     "sin_phase": LANES,
-    "cos_place": LANES,  # of the azimuth behind the first blade
-    "sin_place": LANES,
+    "cos_azimuth_offset": LANES,  # of the azimuth behind the first blade
+    "sin_azimuth_offset": LANES,
     "alternation": LANES,  # of the differential coordinate: +1, -1 from blade to blade, 0 where there is none
     "lead_lag": LANES,  # 1, or 0 where the blade does not lag and for what fills up a quad
-    "first_angle": LANES,  # of the airfoil table [rad]
-    "inverse_step": LANES,
-    "columns": LANES,  # cells of the table along the angle
+    "first_alpha": LANES,  # of the airfoil table [rad]
+    "inverse_alpha_step": LANES,
+    "alpha_cells": LANES,  # cells of the table along the angle
     "first_row": LANES,
-    "least_reynolds": LANES,
-    "largest_reynolds": LANES,
-    "quad": WHOLE,
-    "begins": WHOLE,  # 1 for the first of a quad, 0 for those that follow it
-    "elements": WHOLE,
-    "harmonics": WHOLE,
+    "min_reynolds": LANES,
+    "max_reynolds": LANES,
+    "quad": INTEGER,
+    "starts_quad": INTEGER,  # 1 for the first of a quad, 0 for those that follow it
+    "elements": INTEGER,
+    "harmonics": INTEGER,
 }
 ELEMENT = {
     "span": LANES,  # from the flap hinge [m]
     "chord": LANES,
     "half_area": LANES,  # c ds / 2 [m^2]
-    "lift_share": LANES,
+    "lift_factor": LANES,
     "twist": LANES,
 }
-# sums over the blades of a quad, in the order in which they are added up
+# sums over the blades of a quad, in the order of `sbs_sim.model.dynamics.set_terms`
 SUMS = {
     "thrust": LANES,
-    "sine_moment": LANES,
+    "sine_moment": LANES,  # of air loads about the hub, times the sine of the azimuth
     "cosine_moment": LANES,
     "mass": LANES,
     "first_moment": VECTOR,
     "second_moment": (6,),  # Int x x, y y, z z, x y, y z, z x dm
-    "force": VECTOR,  # of the known loads, what the hinges take off subtracted
+    "force": VECTOR,  # known loads b_k less c Q / A of the hinges, eq. (5.8)
     "moment": VECTOR,
-    "triangle": (21,),  # what the hinges take off the mass matrix, lower triangle row by row
+    # sum of c c^T / A over the hinges, eq. (5.8): force by force, moment by force, moment by moment
+    "hinge_mass": (6,),  # xx, yy, zz, xy, yz, zx
+    "hinge_coupling": MATRIX,
+    "hinge_inertia": (6,),
 }
 HARMONIC = {"flap_cosine": LANES, "flap_sine": LANES, "lag_cosine": LANES, "lag_sine": LANES}
 MEANS = {"flap": LANES, "lag": LANES, "flap_differential": LANES, "lag_differential": LANES}
-HUB = {"force": VECTOR, "moment": VECTOR, "paper": VECTOR}  # paper: the moment in the paper's reading
-# what is kept of a blade until the body's accelerations are known
+# loads on the hub without those of the locked blades, about the c.g., and the moment in the paper's reading
+HUB = {"force": VECTOR, "moment": VECTOR, "paper_moment": VECTOR}
+# terms of a blade that are kept until the body's accelerations are known
 TERMS = {
     "cosine": LANES,
     "sine": LANES,
-    "flap_force": VECTOR,  # c_beta
-    "flap_arm": VECTOR,
-    "lag_force": VECTOR,  # c_xi
-    "lag_arm": VECTOR,
+    "flap_column_force": VECTOR,  # c_beta
+    "flap_column_moment": VECTOR,
+    "lag_column_force": VECTOR,  # c_xi
+    "lag_column_moment": VECTOR,
     "flap_moment": LANES,  # Q_beta
-    "lag_moment": LANES,
-    "inverse_a2": LANES,
-    "force": VECTOR,  # b_k
-    "moment": VECTOR,
+    "lag_moment": LANES,  # Q_xi
+    "inverse_lag_inertia": LANES,  # 1 / A_2, 0 where the blade does not lag
+    "known_force": VECTOR,  # b_k
+    "known_moment": VECTOR,
     "flap_acceleration": LANES,
     "lag_acceleration": LANES,
     "paper_moment": VECTOR,
     "flap_axis": VECTOR,
-    "ut0": LANES,
-    "ut1": LANES,
-    "up0": LANES,
-    "up1": LANES,
+    "u_t_hinge": LANES,
+    "u_t_slope": LANES,
+    "u_p_hinge": LANES,
+    "u_p_slope": LANES,
     "pitch": LANES,
 }
-STRIP = {"speed": LANES, "reynolds": LANES, "fraction": LANES, "row": LANES}
+STRIP = {"airspeed": LANES, "reynolds": LANES, "fraction": LANES, "row": LANES}
+ACCELERATION = {"specific_force": VECTOR, "angular": VECTOR}  # a_g and om', body axes
 LOADS = {"thrust": LANES, "torque": LANES, "force": VECTOR, "moment": VECTOR}  # body axes, about the hub centre
 THRUST, TORQUE, FORCE, MOMENT = 0, 1, 2, 5  # the same as columns
 LOAD_SIZE = 8
@@ -136,16 +143,16 @@ def dtype_of(fields: dict[str, Any], n: int) -> np.dtype[Any]:
 
 @cache
 def _dtype_of(fields: tuple[tuple[str, Any], ...], n: int) -> np.dtype[Any]:
-    return np.dtype([(name, np.int64) if kind is WHOLE else (name, np.float64, (*kind, n)) for name, kind in fields])
+    return np.dtype([(name, np.int64) if kind is INTEGER else (name, np.float64, (*kind, n)) for name, kind in fields])
 
 
 def aligned(shape: Any, dtype: Any) -> NDArray[Any]:
-    """Zeros that begin where a cache line does."""
-    dtype, whole = np.dtype(dtype), shape if isinstance(shape, tuple) else (shape,)
-    size = math.prod(whole) * dtype.itemsize
+    """Zeros that begin at a cache line."""
+    dtype, shape = np.dtype(dtype), shape if isinstance(shape, tuple) else (shape,)
+    size = math.prod(shape) * dtype.itemsize
     raw = np.zeros(size + LINE, dtype=np.uint8)
-    place: int = raw.__array_interface__["data"][0]
-    return np.ndarray(whole, dtype, raw, -place % LINE)
+    address: int = raw.__array_interface__["data"][0]
+    return np.ndarray(shape, dtype, raw, -address % LINE)
 
 
 def records(fields: dict[str, Any], shape: Any, n: int) -> NDArray[Any]:
@@ -153,18 +160,20 @@ def records(fields: dict[str, Any], shape: Any, n: int) -> NDArray[Any]:
     return aligned(shape, dtype_of(fields, n))
 
 
-class Places(NamedTuple):
-    """Where values that belong to rotors stand, by quads: for `sbs_sim.lanes.spread`.
+class StateIndices(NamedTuple):
+    """Indices of the values of the rotor that each quad belongs to, for `sbs_sim.lanes.spread`.
 
     Attributes
     ----------
     azimuth : ndarray of int64, shape (quads,)
-        Number of the rotor.
+        Index of the rotor.
     swash : ndarray of int64, shape (3, quads)
+        In the order of `sbs_sim.model.state.SWASHPLATE_NAMES`.
     flap, flap_rate, lag, lag_rate : ndarray of int64, shape (coordinates, quads)
-        Of the state: collective coordinate, cosine and sine of each harmonic, differential coordinate. What a rotor
-        does not have is the zero behind the state.
+        In the state: collective coordinate, cosine and sine of each harmonic, differential coordinate. Those that the
+        rotor does not have point to the zero behind the state.
     inflow : ndarray of int64, shape (3, quads)
+        In the order of `sbs_sim.model.state.INFLOW_NAMES`.
     """
 
     azimuth: IntArray
@@ -185,7 +194,7 @@ class Model(NamedTuple):
     rotors : structured ndarray, shape (n_rotors,)
     blades : structured ndarray, shape (registers,)
         Blades side by side, or one blade of all flights.
-    places : Places
+    indices : StateIndices
     elements : structured ndarray, shape (tables, elements)
     knots : ndarray, shape (registers, knots, width)
         Reynolds numbers of the airfoil table but for the first and the last; infinite where there are fewer.
@@ -202,7 +211,7 @@ class Model(NamedTuple):
     body: NDArray[Any]
     rotors: NDArray[Any]
     blades: NDArray[Any]
-    places: Places
+    indices: StateIndices
     elements: NDArray[Any]
     knots: Array
     table: Array
@@ -215,15 +224,17 @@ class Work(NamedTuple):
     Attributes
     ----------
     state : ndarray, shape (size + 1, n)
-        The state that the derivative is asked for, and a zero.
+        The state whose derivative is taken, and a zero.
     terms : structured ndarray, shape (registers,)
     sums, means, hubs : structured ndarray, shape (quads,)
         A register of eight blades writes two of them, where the second may belong to no rotor.
     totals : structured ndarray, shape (n_rotors + 1,)
         Sums over each rotor, and over all.
     harmonics : structured ndarray, shape (harmonics, quads)
-    vector : ndarray, shape (6, n)
-        Known side of the body's equations; afterwards specific force of the c.g. and om'.
+    acceleration : structured ndarray, shape (1,)
+        Of the body: specific force of the c.g. [m/s^2] and om' [rad/s^2].
+    acceleration_rows : ndarray, shape (6, n)
+        The same numbers.
     flow : structured ndarray, shape (n_rotors,)
     strip : structured ndarray, shape (elements,)
     loads : structured ndarray, shape (n_rotors,)
@@ -231,8 +242,8 @@ class Work(NamedTuple):
     load_rows : ndarray, shape (8 n_rotors, n)
         The same numbers.
     span : ndarray of int64, shape (2,)
-        First register of blades whose terms are worked out, and the one behind the last; those of the others stay what
-        they were. All of them, unless somebody sets it for a while.
+        First register of blades whose terms are computed, and the one behind the last; those of the others are kept.
+        All of them, except while Jacobians change the states of one rotor only.
     """
 
     state: Array
@@ -242,7 +253,8 @@ class Work(NamedTuple):
     hubs: NDArray[Any]
     totals: NDArray[Any]
     harmonics: NDArray[Any]
-    vector: Array
+    acceleration: NDArray[Any]
+    acceleration_rows: Array
     flow: NDArray[Any]
     strip: NDArray[Any]
     loads: NDArray[Any]
@@ -252,15 +264,16 @@ class Work(NamedTuple):
 
 def state_size(model: Model) -> int:
     """Numbers in the state of one aircraft: of the body, of blades by flap, lag and their rates, and of the inflow."""
-    return 13 + int(4 * model.rotors["blades"].sum() + 3 * len(model.rotors))
+    return BODY_SIZE + int(4 * model.rotors["blades"].sum() + 3 * len(model.rotors))
 
 
 def make_work(model: Model) -> Work:
     """Memory for aircraft of a structure; one for each thread."""
     n = model.air["density"].shape[-1]
-    width = model.blades["speed"].shape[-1]
-    rotors, quads = model.rotors, model.places.azimuth.size  # those that fill up the last register too
+    width = model.blades["rotor_speed"].shape[-1]
+    rotors, quads = model.rotors, model.indices.azimuth.size  # those that fill up the last register too
     size = state_size(model)
+    acceleration_rows = aligned((6, n), float)
     load_rows = aligned((LOAD_SIZE * len(rotors), n), float)
     return Work(
         state=aligned((size + 1, n), float),
@@ -270,7 +283,8 @@ def make_work(model: Model) -> Work:
         hubs=records(HUB, quads, n),
         totals=records(SUMS, len(rotors) + 1, n),
         harmonics=records(HARMONIC, (max(1, int(rotors["harmonics"].max())), quads), n),
-        vector=aligned((6, n), float),
+        acceleration=acceleration_rows.reshape(-1).view(dtype_of(ACCELERATION, n)),
+        acceleration_rows=acceleration_rows,
         flow=records({"velocity": VECTOR}, len(rotors), n),
         strip=records(STRIP, model.elements.shape[1], width),
         loads=load_rows.reshape(-1).view(dtype_of(LOADS, n)),
@@ -280,18 +294,18 @@ def make_work(model: Model) -> Work:
 
 
 class Exponential(NamedTuple):
-    """Coefficients and memory of the exponential method, in blocks of states that belong together.
+    """Coefficients and memory of the exponential method, in blocks of coupled states.
 
     A register holds one state of all flights, or several states of a single one.
 
     Attributes
     ----------
-    places, positions : ndarray of int64, shape (k,)
-        Of the rotors' states: in the state, and in the blocks.
+    states, block_positions : ndarray of int64, shape (k,)
+        Indices of the rotors' states in the simulation state, and in the blocks.
     sizes, starts : ndarray of int64, shape (blocks,)
-        States of each block, and the position of its first one.
+        Number of states of each block, and the position of its first one.
     registers : ndarray of int64, shape (blocks + 1,)
-        The first of each block.
+        First register of each block.
     matrices : ndarray, shape (10, numbers, width)
         See `sbs_sim.model.exponential.coefficients`; for each register the columns of its block one after the other.
     begin, end : ndarray, shape (positions, n)
@@ -302,8 +316,8 @@ class Exponential(NamedTuple):
         Derivatives at the stages.
     """
 
-    places: IntArray
-    positions: IntArray
+    states: IntArray
+    block_positions: IntArray
     sizes: IntArray
     starts: IntArray
     registers: IntArray
@@ -323,7 +337,7 @@ def make_exponential(
     Parameters
     ----------
     blocks : sequence of sequences of int
-        Places of states that belong together.
+        Indices of the states of each block.
     coefficients : sequence of sequences of ndarray, shape (10, m, m)
         Of each flight and each block.
     width : int
@@ -338,8 +352,8 @@ def make_exponential(
     padded = int(registers[-1]) * each
     begin, end = aligned((padded, n), float), aligned((padded, n), float)
     return Exponential(
-        places=_joined(blocks),
-        positions=_joined(within),
+        states=_joined(blocks),
+        block_positions=_joined(within),
         sizes=sizes,
         starts=starts,
         registers=registers,
@@ -357,7 +371,7 @@ def _joined(parts: Sequence[Any]) -> IntArray:
 
 
 def _by_registers(coefficients: Sequence[Sequence[Array]], each: int) -> Array:
-    """Columns of all blocks, cut into registers of so many states of each flight."""
+    """Columns of all blocks, cut into registers of `each` states of every flight."""
     found = []
     for own in zip(*coefficients, strict=True):
         columns = np.stack(own, axis=-1).transpose(0, 2, 1, 3)  # coefficient, column, row, flight
@@ -382,12 +396,12 @@ class Tick(NamedTuple):
         Derivatives at its stages.
     psi : ndarray, shape (n_rotors, n)
     wind : ndarray, shape (3, n)
-    deepest : ndarray, shape (1, n)
-        Down coordinate of the lowest point [m].
+    lowest_point : ndarray, shape (1, n)
+        Down coordinate of the lowest point of the aircraft [m].
     last : ndarray, shape (size, n)
-        The state that ended a flight.
+        The state that was not plausible and ended a flight.
     done : ndarray of int64, shape (n,)
-        Steps of the tick.
+        Steps made in the tick.
     exponential : Exponential
         Without blocks for other methods.
     """
@@ -396,14 +410,14 @@ class Tick(NamedTuple):
     slopes: Array
     psi: Array
     wind: Array
-    deepest: Array
+    lowest_point: Array
     last: Array
     done: IntArray
     exponential: Exponential
 
 
 def make_tick(work: Work, stages: int, exponential: Exponential) -> Tick:
-    """Memory of ticks of a method with so many stages."""
+    """Memory of a tick, for a method with that number of stages."""
     size, n = work.state.shape[0] - 1, work.state.shape[1]
     rotors = len(work.flow)
     return Tick(
@@ -411,7 +425,7 @@ def make_tick(work: Work, stages: int, exponential: Exponential) -> Tick:
         slopes=aligned((stages, size, n), float),
         psi=aligned((rotors, n), float),
         wind=aligned((3, n), float),
-        deepest=aligned((1, n), float),
+        lowest_point=aligned((1, n), float),
         last=aligned((size, n), float),
         done=np.zeros(n, dtype=np.int64),
         exponential=exponential,

@@ -10,28 +10,44 @@ DEGREE = 3  # of the interpolation along the angle
 
 
 class SectionFlow(NamedTuple):
-    """Velocities of the sections in the air: u_T = t0 + t1 s along the motion, u_P = p0 + p1 s along n [m/s]."""
+    """Velocities of the sections in the air, linear along the span, eq. (4.2).
 
-    t0: Any
-    t1: Any
-    p0: Any
-    p1: Any
+    Attributes
+    ----------
+    u_t_hinge, u_t_slope : lanes
+        u_T = u_t_hinge + u_t_slope s along the motion [m/s, 1/s].
+    u_p_hinge, u_p_slope : lanes
+        u_P = u_p_hinge + u_p_slope s along n, up through the disc [m/s, 1/s].
+    """
+
+    u_t_hinge: Any
+    u_t_slope: Any
+    u_p_hinge: Any
+    u_p_slope: Any
 
 
 class AirLoads(NamedTuple):
-    """Sums along a blade: forces along n (up) and t (forward) [N], their first moments about the flap hinge [N m]."""
+    """Sums along a blade, section 4.3.
 
-    normal: Any
-    forward: Any
+    Attributes
+    ----------
+    normal_force, forward_force : lanes
+        Int dF_n (up) and Int dF_t (along the motion) [N].
+    normal_moment, forward_moment : lanes
+        Int s dF_n and Int s dF_t, about the flap hinge [N m].
+    """
+
+    normal_force: Any
+    forward_force: Any
     normal_moment: Any
     forward_moment: Any
 
 
 @kernel
 def section_loads(air, blade, elements, knots, table, strip, flow, pitch):
-    """Air loads of blades.
+    """Air loads of blades, eq. (4.5).
 
-    The elements go by twice, so that both passes fit into the registers.
+    Two loops over the elements, so that the values of each fit into the registers of the processor.
 
     Parameters
     ----------
@@ -51,41 +67,42 @@ def section_loads(air, blade, elements, knots, table, strip, flow, pitch):
     AirLoads
     """
     for i in range(elements.shape[0]):
-        _look_up(air, blade, elements[i], knots, strip[i], flow, pitch)
-    normal = forward = normal_moment = forward_moment = zeros_like(pitch)
+        _find_section(air, blade, elements[i], knots, strip[i], flow, pitch)
+    normal_force = forward_force = normal_moment = forward_moment = zeros_like(pitch)
     for i in range(elements.shape[0]):
-        element, found = elements[i], strip[i]
+        element, section = elements[i], strip[i]
         s = element.span
-        ut = flow.t0 + flow.t1 * s
-        up = flow.p0 + flow.p1 * s
-        lift, lift_slope, drag, drag_slope = table_row(table, found.row, found.fraction, DEGREE)
-        scale = (air.density * element.half_area) * found.speed
-        cl = (lift + lift_slope * found.reynolds) * (scale * element.lift_share)
-        cd = (drag + drag_slope * found.reynolds) * scale
-        dn = cl * ut - cd * up
-        dt = cl * up + cd * ut
-        normal = normal + dn
-        forward = forward - dt
-        normal_moment = normal_moment + s * dn
-        forward_moment = forward_moment - s * dt
-    return AirLoads(normal, forward, normal_moment, forward_moment)
+        u_t = flow.u_t_hinge + flow.u_t_slope * s
+        u_p = flow.u_p_hinge + flow.u_p_slope * s
+        lift, lift_slope, drag, drag_slope = table_row(table, section.row, section.fraction, DEGREE)
+        scale = (air.density * element.half_area) * section.airspeed
+        lift_gain = (lift + lift_slope * section.reynolds) * (scale * element.lift_factor)  # lift over airspeed
+        drag_gain = (drag + drag_slope * section.reynolds) * scale
+        up = lift_gain * u_t - drag_gain * u_p
+        rearward = lift_gain * u_p + drag_gain * u_t
+        normal_force = normal_force + up
+        forward_force = forward_force - rearward
+        normal_moment = normal_moment + s * up
+        forward_moment = forward_moment - s * rearward
+    return AirLoads(normal_force, forward_force, normal_moment, forward_moment)
 
 
 @kernel
-def _look_up(air, blade, element, knots, found, flow, pitch):
-    """Speed, Reynolds number, and place in the airfoil table of one element."""
-    ut = flow.t0 + flow.t1 * element.span
-    up = flow.p0 + flow.p1 * element.span
-    squared = ut * ut + up * up + TINY
-    inverse_speed = inverse_root(squared)
-    speed = squared * inverse_speed
-    alpha = pitch + element.twist - angle_of(up, ut, inverse_speed)
-    place = table_place(blade, knots, speed * (element.chord * air.inverse_viscosity), alpha)
-    found.speed, found.reynolds, found.fraction, found.row = speed, place.reynolds, place.fraction, place.row
+def _find_section(air, blade, element, knots, section, flow, pitch):
+    """Set airspeed, Reynolds number and cell of the airfoil table of one element, eq. (4.4)."""
+    u_t = flow.u_t_hinge + flow.u_t_slope * element.span
+    u_p = flow.u_p_hinge + flow.u_p_slope * element.span
+    squared = u_t * u_t + u_p * u_p + TINY
+    inverse_airspeed = inverse_root(squared)
+    airspeed = squared * inverse_airspeed
+    alpha = pitch + element.twist - angle_of(u_p, u_t, inverse_airspeed)
+    cell = table_cell(blade, knots, airspeed * (element.chord * air.inverse_viscosity), alpha)
+    section.airspeed, section.reynolds = airspeed, cell.reynolds
+    section.fraction, section.row = cell.fraction, cell.row
 
 
-class TablePlace(NamedTuple):
-    """Row of a cell of the airfoil table, fraction of the way through it along the angle, Reynolds number."""
+class TableCell(NamedTuple):
+    """Cell of the airfoil table: its row, the fraction of its width in alpha, the Reynolds number within the table."""
 
     row: Any
     fraction: Any
@@ -93,15 +110,15 @@ class TablePlace(NamedTuple):
 
 
 @kernel
-def table_place(blade, knots, reynolds, alpha):
-    """Place of a Reynolds number and an angle of attack [rad] in the table; a cell of it, whatever they are."""
-    reynolds = least(greatest(reynolds, blade.least_reynolds), blade.largest_reynolds)
-    along = (alpha - blade.first_angle) * blade.inverse_step
-    columns = blade.columns
-    along = select(along < 0.0, 0.0, along)
-    along = select(along > columns, columns, along)  # NaN stays NaN ...
-    column = select(along < columns, floor(along), columns - 1.0)  # ... in a cell of the table
+def table_cell(blade, knots, reynolds, alpha):
+    """Cell at a Reynolds number and an angle of attack [rad]; a row of the table for any values, NaN included."""
+    reynolds = least(greatest(reynolds, blade.min_reynolds), blade.max_reynolds)
+    position = (alpha - blade.first_alpha) * blade.inverse_alpha_step
+    cells = blade.alpha_cells
+    position = select(position < 0.0, 0.0, position)
+    position = select(position > cells, cells, position)  # NaN stays NaN ...
+    column = select(position < cells, floor(position), cells - 1.0)  # ... in a cell of the table
     row = blade.first_row + column
     for k in range(knots.shape[0]):
-        row = row + select(reynolds >= knots[k], columns, 0.0)
-    return TablePlace(row, along - column, reynolds)
+        row = row + select(reynolds >= knots[k], cells, 0.0)
+    return TableCell(row, position - column, reynolds)

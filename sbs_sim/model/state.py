@@ -1,7 +1,7 @@
-"""The vectors of the model: states, controls, outputs; their names, units and places.
+"""The vectors of the model: states, controls, outputs; their names, units and indices.
 
 Everything that reads or writes a state vector (dynamics, trim, linearization, recorder, messages) takes the
-places from here. Two vectors describe the same aircraft:
+indices from here. Two vectors describe the same aircraft:
 
 simulation state, 13 + 4 n_blades + 3 n_rotors values
     position (NED, m) | attitude (unit quaternion w, x, y, z: body FRD to NED) | velocity u, v, w (body, m/s) |
@@ -19,20 +19,25 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.lanes import Vector
 from sbs_sim.model import frames
+from sbs_sim.model.kernel import kernel
 
 Array = NDArray[np.float64]
 
 POSITION, ATTITUDE, VELOCITY, RATES = 0, 3, 7, 10  # first index of each part of the simulation state
+DOWN = POSITION + 2
 BODY_SIZE = 13
 LINEAR_BODY_SIZE = 8
 LINEAR_U, LINEAR_W, LINEAR_Q, LINEAR_THETA, LINEAR_V, LINEAR_P, LINEAR_PHI, LINEAR_R = range(LINEAR_BODY_SIZE)
 LINEAR_BODY_NAMES = ("u", "w", "q", "theta", "v", "p", "phi", "r")
 LINEAR_BODY_UNITS = ("m/s", "m/s", "rad/s", "rad", "m/s", "rad/s", "rad", "rad/s")
 CONTROL_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")
-EULER_NAMES, AIRSPEED = ("psi", "theta", "phi"), "V"  # what can be told of a simulation state besides
+EULER_NAMES, AIRSPEED = ("psi", "theta", "phi"), "V"  # outputs that follow from a simulation state
 SWASHPLATE_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic")
+COLLECTIVE, LATERAL, LONGITUDINAL = range(3)  # of SWASHPLATE_NAMES
 INFLOW_NAMES = ("lambda0", "lambdas", "lambdac")
+UNIFORM, SINE, COSINE = range(3)  # of INFLOW_NAMES
 
 _ROTOR_STATE = re.compile(
     r"(?P<rate>d?)(?:[ab](?P<flap>\d+|d)|xi(?P<lag>0|d|\d*[cs]))\((?P<rotor>\d+)\)"
@@ -116,7 +121,7 @@ def part_of(name: str) -> Part:
 
 @dataclass(frozen=True)
 class StateLayout:
-    """Places and names of all states of an aircraft.
+    """Indices and names of all states of an aircraft.
 
     Parameters
     ----------
@@ -146,23 +151,23 @@ class StateLayout:
         return slice(first, first + self.blades[rotor])
 
     def flap(self, rotor: int) -> slice:
-        """Place of one rotor's flap coordinates in the simulation state [rad]."""
+        """Indices of one rotor's flap coordinates in the simulation state [rad]."""
         return self._multiblade(0, rotor)
 
     def flap_rate(self, rotor: int) -> slice:
-        """Place of one rotor's flap coordinate rates [rad/s]."""
+        """Indices of one rotor's flap coordinate rates [rad/s]."""
         return self._multiblade(1, rotor)
 
     def lag(self, rotor: int) -> slice:
-        """Place of one rotor's lag coordinates [rad], positive against the rotation."""
+        """Indices of one rotor's lag coordinates [rad], positive against the rotation."""
         return self._multiblade(2, rotor)
 
     def lag_rate(self, rotor: int) -> slice:
-        """Place of one rotor's lag coordinate rates [rad/s]."""
+        """Indices of one rotor's lag coordinate rates [rad/s]."""
         return self._multiblade(3, rotor)
 
     def inflow(self, rotor: int) -> slice:
-        """Place of one rotor's lambda0, lambdas, lambdac in the simulation state."""
+        """Indices of one rotor's lambda0, lambdas, lambdac in the simulation state."""
         first = BODY_SIZE + 4 * self.blade_count + 3 * rotor
         return slice(first, first + 3)
 
@@ -251,3 +256,27 @@ def _flap_name(suffix: str, letters: tuple[str, str]) -> str:
         return cosine + suffix
     order = suffix[:-1] or "1"
     return (cosine if suffix.endswith("c") else sine) + order
+
+
+@kernel
+def vector_at(x, first):
+    """Vector of three successive values, for example of `VELOCITY`."""
+    return Vector(x[first], x[first + 1], x[first + 2])
+
+
+@kernel
+def set_vector(x, first, vector):
+    """Set three successive values."""
+    x[first], x[first + 1], x[first + 2] = vector.x, vector.y, vector.z
+
+
+@kernel
+def attitude_at(x):
+    """Attitude of a simulation state."""
+    return frames.Quaternion(x[ATTITUDE], x[ATTITUDE + 1], x[ATTITUDE + 2], x[ATTITUDE + 3])
+
+
+@kernel
+def set_attitude(x, quaternion):
+    """Set the attitude of a simulation state, or its rate."""
+    x[ATTITUDE], x[ATTITUDE + 1], x[ATTITUDE + 2], x[ATTITUDE + 3] = quaternion

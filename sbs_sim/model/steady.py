@@ -2,20 +2,23 @@
 
 from sbs_sim.lanes import Vector, as_lanes, cross, rounded, spread, zeros_like
 from sbs_sim.model.dynamics import (
-    add_up,
     blade_terms,
+    body_loads,
     body_motion,
     body_rates,
     hub_loads,
     in_lanes,
     memory_in_lanes,
     rotor_rates,
-    set_vector,
+    set_acceleration,
+    set_hub_velocities,
     solve_blades,
     solve_blades_alone,
-    start_body,
+    sum_blades,
+    with_hub_loads,
 )
 from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.state import set_vector
 
 
 @entry
@@ -30,8 +33,8 @@ def steady_balance(model, x, swash, psi, wind, work, dx, imbalance):
     Parameters
     ----------
     model, x, swash, psi, wind, work : see `sbs_sim.model.dynamics.derivative`
-        `work.loads` holds the loads of the blades on constant coordinates afterwards, `work.vector` the specific
-        force of the c.g. in steady motion, om x U - g [m/s^2], and three zeros.
+        Afterwards `work.loads` holds the loads of the blades on constant coordinates, `work.acceleration` the specific
+        force of the c.g. in steady motion, om x U - g [m/s^2], and no angular acceleration.
     dx : ndarray, shape (size, n)
         Output: rates of the rotor states, and of position and attitude; U' and om' are zero.
     imbalance : ndarray, shape (6, n)
@@ -44,36 +47,32 @@ def steady_balance(model, x, swash, psi, wind, work, dx, imbalance):
         memory.state[i] = given[i]
     flight = body_motion(aircraft, memory.state, as_lanes(wind, like))
     blade_terms(aircraft, memory, flight, as_lanes(swash, like), as_lanes(psi, like))
-    add_up(aircraft, memory)
-    start_body(aircraft, memory, flight)
-    b = memory.vector
-    force, moment = Vector(b[0], b[1], b[2]), Vector(b[3], b[4], b[5])
-    steady = cross(flight.rates, flight.velocity) - flight.gravity
-    set_vector(b, steady, Vector(0.0, 0.0, 0.0))
+    sum_blades(aircraft, memory)
+    set_hub_velocities(aircraft, memory, flight)
+    loads = body_loads(aircraft, memory, flight)
+    steady = cross(flight.omega, flight.velocity) - flight.gravity
+    set_acceleration(memory, steady, Vector(0.0, 0.0, 0.0))
     if aircraft.switches[0].complete_coupling == 1:
         solve_blades(aircraft, memory)
     else:
         solve_blades_alone(aircraft, memory)
-    body_rates(memory.state, flight, b, rates)
+    body_rates(memory, flight, rates)
     rotor_rates(aircraft, memory, rates)
     hold_coordinates(aircraft, memory)
     hub_loads(aircraft, memory)
-    for j in range(aircraft.rotors.shape[0]):
-        rotor, out = aircraft.rotors[j], memory.loads[j]
-        force = force + out.force
-        moment = moment + (out.moment + cross(rotor.hub, out.force))
-    body = aircraft.body[0]
-    set_vector(left, force - steady * body.mass, moment - cross(body.first_moment, steady))
+    total, body = with_hub_loads(aircraft, memory, loads), aircraft.body[0]
+    set_vector(left, 0, total.force - steady * body.mass)
+    set_vector(left, 3, total.moment - cross(body.first_moment, steady))
 
 
 @kernel
 def hold_coordinates(aircraft, memory):
     """Accelerations of the blades in the rotating frame on multiblade coordinates that do not change."""
-    places = aircraft.places
+    indices = aircraft.indices
     for r in range(aircraft.blades.shape[0]):
         blade, terms = aircraft.blades[r], memory.terms[r]
-        flap = steady_acceleration(memory.state, places.flap, blade, terms)
-        lag = steady_acceleration(memory.state, places.lag, blade, terms)
+        flap = steady_acceleration(memory.state, indices.flap, blade, terms)
+        lag = steady_acceleration(memory.state, indices.lag, blade, terms)
         terms.flap_acceleration, terms.lag_acceleration = flap, lag * blade.lead_lag
 
 
@@ -84,7 +83,7 @@ def steady_acceleration(x, angles, blade, terms):
     cosine, sine = terms.cosine, terms.sine
     cn, sn = cosine, sine
     for n in range(1, blade.harmonics + 1):
-        harmonic = rounded(n * blade.speed)
+        harmonic = rounded(n * blade.rotor_speed)
         a, b = spread(x, angles[2 * n - 1], blade.quad, blade), spread(x, angles[2 * n], blade.quad, blade)
         acceleration = acceleration + harmonic * harmonic * (a * cn + b * sn)
         cn, sn = cn * cosine - sn * sine, sn * cosine + cn * sine

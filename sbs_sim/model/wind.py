@@ -25,12 +25,12 @@ Array = NDArray[np.float64]
 STEADY, GUST, GUST_START, GUST_DURATION, TURBULENCE_FROM, TURBULENCE_TO = 0, 3, 6, 7, 8, 11
 WIND_SIZE = 14
 BLOCK = 10_000  # ticks that turbulence goes on by at once
-LARGEST_WIND = 100.0  # m/s; the strongest wind measured at the ground is 113 m/s
+MAX_WIND = 100.0  # m/s; the strongest wind measured at the ground is 113 m/s
 RANGES = {
     "gust_delay": (0.0, 1e6, "s"),
     "gust_duration": (0.0, 1e6, "s"),
     "turbulence_length": (0.1, 1e4, "m"),
-    "turbulence_airspeed": (0.1, LARGEST_WIND, "m/s"),
+    "turbulence_airspeed": (0.1, MAX_WIND, "m/s"),
     "turbulence_direction": (-10.0, 10.0, "rad"),
 }
 
@@ -115,13 +115,13 @@ class Wind:
     def __post_init__(self) -> None:
         """Check every field, and make plain numbers of them, so that equal winds are equal."""
         for name in ("velocity", "gust", "turbulence_intensity"):
-            least = 0.0 if name == "turbulence_intensity" else -LARGEST_WIND
+            least = 0.0 if name == "turbulence_intensity" else -MAX_WIND
             values = getattr(self, name)
             if not isinstance(values, Sequence | np.ndarray) or len(values) != 3:
                 allowed = "allowed are 3 values, north, east, down [m/s]"
                 raise SimulationError(f"{name} = {checks.shown(values)}: {allowed}")
             numbers = [
-                checks.number(f"{name}.{axis}", value, least, LARGEST_WIND, "m/s", SimulationError)
+                checks.number(f"{name}.{axis}", value, least, MAX_WIND, "m/s", SimulationError)
                 for axis, value in zip("xyz", values, strict=True)
             ]
             object.__setattr__(self, name, tuple(numbers))

@@ -42,14 +42,14 @@ def working_state(model, work, out):
     for r in range(aircraft.blades.shape[0]):
         blade = aircraft.blades[r]
         found = shares(aircraft, blade, memory.terms[r], angles[r])
-        add_to_quads(memory.hubs, blade.quad, blade.begins, "force", found)
+        add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "force", found)
     for j in range(aircraft.rotors.shape[0]):
         rotor, row, flow = aircraft.rotors[j], rows[j], memory.flow[j].velocity
         thrust, scale = memory.totals[j].thrust, rotor.inverse_tip_speed
         sense = select(thrust >= 0.0, 1.0, -1.0)  # upside down, all that follows is
         through = flow.z * scale
         row[ADVANCE_RATIO] = sqrt(flow.x * flow.x + flow.y * flow.y) * scale
-        row[HOVER_INFLOW] = rotor.duct * sqrt(2.0 * abs(thrust) * rotor.load_scale)
+        row[HOVER_INFLOW] = rotor.duct_expansion * sqrt(2.0 * abs(thrust) * rotor.coefficient_scale)
         row[DESCENT] = sense * through
         row[FLOW] = sense * (memory.state[rotor.inflow] - through)
         found, area = Vector(0.0, 0.0, 0.0), zeros_like(scale)
@@ -66,8 +66,8 @@ def shares(aircraft, blade, terms, angles):
     area = stalled = reversed_ = outside = zeros_like(terms.pitch)
     for i in range(elements.shape[0]):
         element = elements[i]
-        part = (blade.hinge + element.span) * element.half_area / element.chord
-        ut, up = terms.ut0 + terms.ut1 * element.span, terms.up0 + terms.up1 * element.span
+        part = (blade.hinge_offset + element.span) * element.half_area / element.chord
+        ut, up = terms.u_t_hinge + terms.u_t_slope * element.span, terms.u_p_hinge + terms.u_p_slope * element.span
         squared = ut * ut + up * up + TINY
         inverse_speed = inverse_root(squared)
         alpha = terms.pitch + element.twist - angle_of(up, ut, inverse_speed)
@@ -81,7 +81,7 @@ def shares(aircraft, blade, terms, angles):
         area = area + part
         reversed_ = reversed_ + select(backwards, part, 0.0)
         stalled = stalled + select(backwards | attached, 0.0, part)
-        known = (reynolds >= blade.least_reynolds) & (reynolds <= blade.largest_reynolds)
+        known = (reynolds >= blade.min_reynolds) & (reynolds <= blade.max_reynolds)
         outside = outside + select(known, 0.0, part)
     return stalled, reversed_, outside, area
 

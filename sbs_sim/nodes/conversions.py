@@ -50,7 +50,7 @@ from sbs_sim.model.average import azimuths
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.state import harmonic_count
-from sbs_sim.model.wind import LARGEST_WIND, Wind
+from sbs_sim.model.wind import MAX_WIND, Wind
 
 Array = NDArray[np.float64]
 
@@ -117,7 +117,7 @@ def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
         gust_duration=request.gust_duration,
         turbulence_intensity=_triple(request.turbulence_intensity),
         turbulence_length=request.turbulence_length or DEFAULT_TURBULENCE_LENGTH,
-        turbulence_airspeed=request.turbulence_airspeed or min(max(speed, LEAST_TURBULENCE_AIRSPEED), LARGEST_WIND),
+        turbulence_airspeed=request.turbulence_airspeed or min(max(speed, LEAST_TURBULENCE_AIRSPEED), MAX_WIND),
         turbulence_direction=math.atan2(relative[1], relative[0]) if moving else heading,
         turbulence_seed=request.turbulence_seed,
     )

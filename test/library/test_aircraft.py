@@ -879,7 +879,7 @@ def test_a_partial_airfoil_is_extended_for_the_blades_of_each_rotor(tmp_path):
         assert list(aircraft.airfoils) == ["wing"]
     # what flies has both: across the wind, with a blade of any pitch, the drag of each
     model = aircraft.model()
-    first, columns = model.blades["first_row"][::3, 0], int(model.blades["columns"][0, 0])
+    first, columns = model.blades["first_row"][::3, 0], int(model.blades["alpha_cells"][0, 0])
     quarter = columns // 12 + columns // 2  # cell that begins at 90 deg, of three turns
     drag = [model.table[int(row) + quarter] for row in first]  # c_02 and c_03: of x^0, and its slope over Re
     assert [row[2] + 1e5 * row[3] for row in drag] == pytest.approx(broadside)

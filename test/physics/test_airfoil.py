@@ -23,7 +23,7 @@ from sbs_sim.model.airfoil import (
 )
 from sbs_sim.model.frames import ONE
 from sbs_sim.model.records import BLADE, records
-from sbs_sim.model.section import DEGREE, table_place
+from sbs_sim.model.section import DEGREE, table_cell
 
 ROOT = Path(__file__).resolve().parents[2]
 AIRFOILS = ROOT / "config" / "airfoils"
@@ -36,10 +36,10 @@ DEG = math.pi / 180
 def _look_up(like, blades, knots, table, given, out):
     blade = as_records(blades)[0]
     values, found = as_lanes(given, as_records(like)), as_lanes(out, as_records(like))
-    place = table_place(blade, as_lanes(knots, blade), values[0], values[1])
-    lift, lift_slope, drag, drag_slope = table_row(table, place.row, place.fraction, DEGREE)
-    found[0], found[1] = lift + lift_slope * place.reynolds, drag + drag_slope * place.reynolds
-    found[2], found[3] = place.row, place.fraction
+    cell = table_cell(blade, as_lanes(knots, blade), values[0], values[1])
+    lift, lift_slope, drag, drag_slope = table_row(table, cell.row, cell.fraction, DEGREE)
+    found[0], found[1] = lift + lift_slope * cell.reynolds, drag + drag_slope * cell.reynolds
+    found[2], found[3] = cell.row, cell.fraction
 
 
 class Reader:
@@ -53,8 +53,13 @@ class Reader:
         self.knots = np.append(table.reynolds[1:-1], [np.inf, np.inf])[:, np.newaxis]
         self.blade = records(BLADE, 1, 1)
         columns, first_angle, inverse_step = cell_grid(table)
-        values = {"first_angle": first_angle, "inverse_step": inverse_step, "columns": columns, "first_row": 3.0}
-        values |= {"least_reynolds": table.reynolds[0], "largest_reynolds": table.reynolds[-1]}
+        values = {
+            "first_alpha": first_angle,
+            "inverse_alpha_step": inverse_step,
+            "alpha_cells": columns,
+            "first_row": 3.0,
+        }
+        values |= {"min_reynolds": table.reynolds[0], "max_reynolds": table.reynolds[-1]}
         for name, value in values.items():
             self.blade[name] = value
         self.place(table.reynolds[0], 0.0)  # compile

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from sbs_sim.lanes import Vector, as_lanes, as_records
 from sbs_sim.model.frames import (
     ONE,
+    Quaternion,
     euler_angles,
     euler_to_quaternion,
     hub_axes,
@@ -27,10 +28,11 @@ from sbs_sim.model.frames import (
 def _attitude(like, given, out):
     records = as_records(like)
     v, found = as_lanes(given, records), as_lanes(out, records)
-    matrix = rotation(v[0], v[1], v[2], v[3])
+    attitude = Quaternion(v[0], v[1], v[2], v[3])
+    matrix = rotation(attitude)
     for i, row in enumerate((matrix.x, matrix.y, matrix.z)):
         found[3 * i], found[3 * i + 1], found[3 * i + 2] = row.x, row.y, row.z
-    found[9], found[10], found[11], found[12] = quaternion_rates(v[0], v[1], v[2], v[3], Vector(v[4], v[5], v[6]))
+    found[9], found[10], found[11], found[12] = quaternion_rates(attitude, Vector(v[4], v[5], v[6]))
 
 
 def attitude(quaternion, rates=(0.0, 0.0, 0.0)):

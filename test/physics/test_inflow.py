@@ -6,7 +6,7 @@ import pytest
 from helpers import build
 
 from sbs_sim.lanes import Vector, as_lanes, as_records, rounded
-from sbs_sim.model.inflow import disc_flow, inflow_matrix, inflow_rates
+from sbs_sim.model.inflow import Inflow, disc_flow, inflow_matrix, inflow_rates
 
 MASS = np.array([8 / (3 * np.pi), 16 / (45 * np.pi), 16 / (45 * np.pi)])  # order 0, s, c
 SPEED, DUCT = 287.0, 0.8
@@ -16,7 +16,7 @@ SPEED, DUCT = 287.0, 0.8
 def rotors():
     """Records of two rotors that turn clockwise and counter-clockwise, in one lane."""
     found = build(every_rotor={"duct_expansion": DUCT}).model().rotors.copy()
-    found["speed"] = SPEED
+    found["rotor_speed"] = SPEED
     return found
 
 
@@ -25,8 +25,8 @@ def _rates(rotors, number, given, cyclic, out):
     rotor = as_records(rotors)[number]
     v, result = as_lanes(given, rotor), as_lanes(out, rotor)
     flow = disc_flow(v[0], Vector(v[3], v[4], v[5]), rotor.sense)
-    rates = inflow_rates(rotor, Vector(v[0], v[2], v[1]), flow, Vector(v[6], v[8], v[7]), cyclic)
-    result[0], result[1], result[2] = rounded(rates.x), rounded(rates.z), rounded(rates.y)
+    rates = inflow_rates(rotor, Inflow(v[0], v[2], v[1]), flow, Inflow(v[6], v[8], v[7]), cyclic)
+    result[0], result[1], result[2] = rounded(rates.uniform), rounded(rates.sine), rounded(rates.cosine)
 
 
 def rates_of(rotors, sense, lambdas, mu, loads, cyclic):

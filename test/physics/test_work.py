@@ -71,9 +71,9 @@ def test_marks_would_show_memory_that_is_too_small(sbs, monkeypatch):
     """With room for the quads of the rotors alone, a register of eight blades writes behind it."""
     aircraft = with_rotors(sbs, (3, 3, 3))
     model = by_blades(aircraft.model(), WIDE)
-    assert model.places.azimuth.size == 4
+    assert model.indices.azimuth.size == 4
     made = marked(monkeypatch)
-    work = R.make_work(model._replace(places=model.places._replace(azimuth=model.places.azimuth[:3])))
+    work = R.make_work(model._replace(indices=model.indices._replace(azimuth=model.indices.azimuth[:3])))
     x = R.aligned((aircraft.layout.size, 1), float)
     x[3] = 1.0
     memory = [R.aligned((count, 1), float) for count in (9, 3, 3)]

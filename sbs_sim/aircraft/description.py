@@ -151,7 +151,12 @@ class Rotor(ByContent):
         "Damping of the lag hinge", 0, 1e9, "N m s/rad", symbol=r"C_\xi", model_field="lag_damping"
     )
     pitch_flap_coupling: float = number(
-        "Blade pitch taken off per flap angle", -10, 10, "rad/rad", symbol=r"K_{t\beta}", model_field="pitch_flap_coupling"
+        "Blade pitch taken off per flap angle",
+        -10,
+        10,
+        "rad/rad",
+        symbol=r"K_{t\beta}",
+        model_field="pitch_flap_coupling",
     )
     pitch_lag_coupling: float = number(
         "Blade pitch taken off per lag angle", -10, 10, "rad/rad", symbol=r"K_{t\xi}", model_field="pitch_lag_coupling"

@@ -30,24 +30,24 @@ from sbs_sim.flight.simulation import Simulation
 from sbs_sim.model.wind import Wind
 
 QUEUE_LENGTH = 100  # snapshots between the flight and their reader: one second at 100 Hz
-FAST_LENGTH = 2  # the same where the flight waits for its reader: how far a controller is behind
-REACTION = 0.05  # s in which a flight that waits for its reader answers its mail
-HURRY_TICKS = 10  # the schedule is kept by hurrying up to this many ticks; beyond, real time is lost for good
-READER_PATIENCE = 2.0  # s in which a reader takes a report, if there is one
+FAST_LENGTH = 2  # the same if the flight waits for its reader: limits the delay of a controller
+MAIL_POLL_PERIOD = 0.05  # s between checks of the mailbox while the flight waits for its reader
+MAX_CATCH_UP_TICKS = 10  # a delay of up to this many ticks is caught up; a longer one shifts the schedule
+READER_TIMEOUT = 2.0  # s in which a reader takes a report, if there is one
 IDLE_PERIOD = 0.1  # s of wall time between reports while paused
 RATE_WINDOW = 1.0  # s of wall time over which the real-time factor is measured
-MOST_STEP_TICKS = 1_000  # some half a second of wall time for which other services wait
+MAX_STEP_TICKS = 1_000  # some half a second of wall time for which other services wait
 
 
 @dataclass(frozen=True)
-class Report:
+class LoopReport:
     """State of the loop when it was handed out, with a snapshot if the aircraft has moved.
 
     Attributes
     ----------
     snapshot : Snapshot or None
     repeated : bool
-        The snapshot has been handed out before, and comes again for a log that begins.
+        The snapshot has been handed out before; it is repeated for a log that starts.
     playing : bool
     step : int
         Integration steps since the start.
@@ -103,8 +103,8 @@ class FlightLoop:
         self._wake = threading.Condition()
         self.set_pace(real_time_factor)
         self.set_command_timeout(command_timeout)
-        self.reports: queue.Queue[Report | None] = queue.Queue(QUEUE_LENGTH)
-        self._take: Callable[[Report], bool] | None = None
+        self.reports: queue.Queue[LoopReport | None] = queue.Queue(QUEUE_LENGTH)
+        self._take: Callable[[LoopReport], bool] | None = None
         self._mailbox: collections.deque[tuple[Callable[[], Any], Future[Any]]] = collections.deque()
         self._thread = threading.Thread(target=self._run, name="flight", daemon=True)
         self._playing = True
@@ -127,7 +127,7 @@ class FlightLoop:
         """Start to fly."""
         self._thread.start()
 
-    def read_by(self, take: Callable[[Report], bool]) -> None:
+    def read_by(self, take: Callable[[LoopReport], bool]) -> None:
         """Let the reader take reports in the flight's own thread where the flight would wait for him anyway.
 
         That saves waking two threads at every tick. Before the start; the reader then calls `reports.task_done` after
@@ -147,7 +147,7 @@ class FlightLoop:
             self._wake.notify()
         if self._thread.is_alive():
             self._thread.join()
-        patience = READER_PATIENCE  # none of the reports is lost on a reader that is only slow
+        patience = READER_TIMEOUT  # none of the reports is lost on a reader that is only slow
         while True:
             try:
                 self.reports.put(None, timeout=patience)
@@ -185,7 +185,7 @@ class FlightLoop:
         Raises
         ------
         SimulationError
-            The loop has ended, or there is no answer in time; what has not begun by then will not be done.
+            The loop has ended, or there is no answer in time; a call that has not started by then is cancelled.
         Exception
             Whatever the function raises.
         """
@@ -208,7 +208,7 @@ class FlightLoop:
 
     def step(self, ticks: int) -> float:
         """Fly some ticks while paused and return the simulation time [s] after them."""
-        ticks = checks.whole("ticks", ticks, 1, MOST_STEP_TICKS, SimulationError)
+        ticks = checks.whole("ticks", ticks, 1, MAX_STEP_TICKS, SimulationError)
         left = ticks
         while left:
             left, time_after = self.call(functools.partial(self._some_ticks, left))
@@ -302,8 +302,8 @@ class FlightLoop:
         now = time.monotonic()
         period = self._simulation.tick / pace
         late = now - self._anchor - self._ticks_due * period
-        if replan or late > HURRY_TICKS * period:
-            # no hurry can make up for this: the ticks that real time has lost all missed their deadline
+        if replan or late > MAX_CATCH_UP_TICKS * period:
+            # too late to catch up: all ticks of the delay have missed their deadline
             self._missed += 0 if replan else int(late / period)
             self._anchor, self._ticks_due = now, 0
         due = self._anchor + self._ticks_due * period
@@ -320,7 +320,7 @@ class FlightLoop:
         if self._take is not None:
             return self._all_is_read()
         with self.reports.not_full:
-            return self.reports.not_full.wait_for(lambda: len(self.reports.queue) < FAST_LENGTH, REACTION)
+            return self.reports.not_full.wait_for(lambda: len(self.reports.queue) < FAST_LENGTH, MAIL_POLL_PERIOD)
 
     def _all_is_read(self) -> bool:
         """Wait until all reports in the queue have been read; false if that takes long."""
@@ -328,7 +328,7 @@ class FlightLoop:
         if not reports.unfinished_tasks:
             return True
         with reports.all_tasks_done:
-            return reports.all_tasks_done.wait_for(lambda: not reports.unfinished_tasks, REACTION)
+            return reports.all_tasks_done.wait_for(lambda: not reports.unfinished_tasks, MAIL_POLL_PERIOD)
 
     def _tick(self) -> None:
         """One tick, with its deadline looked after."""
@@ -405,7 +405,7 @@ class FlightLoop:
         """Hand out the present state; a patient report waits for its reader, another is dropped if there is none."""
         simulation = self._simulation
         age = 0.0 if self._command_time is None else simulation.time - self._command_time
-        report = Report(
+        report = LoopReport(
             snapshot=simulation.snapshot() if with_snapshot else None,
             playing=self._playing,
             step=simulation.step,

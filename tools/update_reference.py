@@ -21,7 +21,7 @@ from typing import Any
 from sbs_sim.aircraft.declaration import Declaration, declarations, leaves
 from sbs_sim.aircraft.description import Description
 from sbs_sim.nodes.endpoints import Endpoint, endpoints, quality
-from sbs_sim.nodes.host import Parameter
+from sbs_sim.nodes.parameters import Parameter
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "docs" / "reference"

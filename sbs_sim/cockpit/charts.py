@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from viser import ViserServer, uplot
 
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.cockpit.told import line
+from sbs_sim.cockpit.trim_report import line
 from sbs_sim.flight.records import Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
@@ -28,8 +28,8 @@ FONT = "10px sans-serif"
 HEIGHT = 100  # pixels of a chart
 HEAVY = 1e4  # N of weight, beyond which loads are in thousands
 STEPS = (1.0, 2.0, 5.0, 10.0)  # of marks on a vertical axis, times a power of ten
-MOST_STEPS = 3  # between the ends of a vertical axis: so many have room for their numbers
-LEAST_SPAN = 1e-3  # that a vertical axis covers, over the largest value: rounding is no signal
+MAX_AXIS_STEPS = 3  # between the ends of a vertical axis: so many have room for their numbers
+MIN_RELATIVE_SPAN = 1e-3  # that a vertical axis covers, over the largest value: rounding is no signal
 DEGREES = 180.0 / math.pi
 
 
@@ -91,8 +91,8 @@ def rotor_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
     def names(*kinds: str) -> tuple[str, ...]:
         return tuple(f"{kind} ({j + 1})" if several else kind for j in rotors for kind in kinds)
 
-    def coordinates(place: Callable[[int], slice], factor: float) -> Callable[[Snapshot], Sequence[float]]:
-        return lambda snapshot: [float(factor * value) for j in rotors for value in snapshot.state[place(j)][:3]]
+    def coordinates(part: Callable[[int], slice], factor: float) -> Callable[[Snapshot], Sequence[float]]:
+        return lambda snapshot: [float(factor * value) for j in rotors for value in snapshot.state[part(j)][:3]]
 
     heavy = aircraft.body.mass * aircraft.environment.gravity > HEAVY
     factor, kilo = (1e-3, "k") if heavy else (1.0, "")
@@ -112,7 +112,7 @@ def rotor_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
     )
 
 
-class History:
+class ChartHistory:
     """The charts' values of the last seconds.
 
     Parameters
@@ -165,7 +165,7 @@ class ChartColumn:
 
     def __init__(self, server: ViserServer, charts: Sequence[Chart], heading: str = "") -> None:
         self._charts = charts
-        self.history = History(charts)
+        self.history = ChartHistory(charts)
         self._heading = server.gui.add_html(line(heading, "font-size:11px;padding:2px 8px"))
         self._captions, self._plots = [], []
         self._updates = 0
@@ -210,12 +210,12 @@ def axis_range(low: float, high: float, least: float) -> tuple[float, float]:
     least : float
         What it covers at least.
     """
-    margin = max(0.0, 0.5 * (least - (high - low)), 0.5 * (LEAST_SPAN * max(abs(low), abs(high)) - (high - low)))
+    margin = max(0.0, 0.5 * (least - (high - low)), 0.5 * (MIN_RELATIVE_SPAN * max(abs(low), abs(high)) - (high - low)))
     low, high = low - margin, high + margin
-    power = 10.0 ** math.floor(math.log10((high - low) / MOST_STEPS))
+    power = 10.0 ** math.floor(math.log10((high - low) / MAX_AXIS_STEPS))
     for step in (power * factor for factor in (*STEPS, 20.0)):
         first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-        if last - first <= MOST_STEPS:
+        if last - first <= MAX_AXIS_STEPS:
             break
     return first * step, last * step
 

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 from viser import ViserServer
 
-from sbs_sim.cockpit.panels import KEYS
+from sbs_sim.cockpit.fly_panel import KEYS
 
 
 class Keyed(Protocol):

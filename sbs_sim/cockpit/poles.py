@@ -17,8 +17,8 @@ from sbs_sim.output.plot_labels import name_poles
 
 STABLE, UNSTABLE = "#0072B2", "#D55E00"
 TEXT_SIZE = 7.0  # points
-LONGEST = 32  # letters of a name in the map
-NEAR = 8.0  # rad/s: the poles of the body lie within, those of the rotors without
+MAX_NAME_LENGTH = 32  # letters of a name in the map
+BODY_POLE_RADIUS = 8.0  # rad/s: the poles of the body lie within, those of the rotors without
 # names of modes come from whoever publishes them: a $ begins no formula
 SETTINGS = {
     "text.parse_math": False,
@@ -74,13 +74,13 @@ def pole_page(poles: Sequence[Pole], title: str) -> str:
 def pole_figure(poles: Sequence[Pole]) -> Figure:
     """All poles by number, and those near the origin by name, upper half of the complex plane."""
     numbered = {f"{i} {pole.name}": pole.value for i, pole in enumerate(poles, 1)}
-    names = {name: value for name, value in numbered.items() if abs(value) <= NEAR}
+    names = {name: value for name, value in numbered.items() if abs(value) <= BODY_POLE_RADIUS}
     numbers = {name.split()[0]: value for name, value in numbered.items()}
     with rc_context(SETTINGS):  # type: ignore[arg-type]
         figure = Figure(figsize=(3.5, 4.4), layout="constrained")
         canvas = FigureCanvasAgg(figure)
         near, wide = figure.subplots(2, 1)
-        _draw(near, list(names.values()), f"within {NEAR:g} rad/s")
+        _draw(near, list(names.values()), f"within {BODY_POLE_RADIUS:g} rad/s")
         _draw(wide, list(numbers.values()), "all")
         wide.set_xlabel("real part [1/s]")
         canvas.draw()  # settles the layout, which the places of the names depend on
@@ -95,7 +95,7 @@ def _array(poles: Mapping[str, complex]) -> NDArray[np.complex128]:
 
 def _short(name: str) -> str:
     """A name that fits; the table has all of it."""
-    return name if len(name) <= LONGEST else f"{name[:LONGEST]}…"
+    return name if len(name) <= MAX_NAME_LENGTH else f"{name[:MAX_NAME_LENGTH]}…"
 
 
 def _draw(axes: Axes, poles: Sequence[complex], title: str) -> None:

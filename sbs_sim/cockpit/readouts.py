@@ -167,6 +167,6 @@ def _state_line(status: Status, source: str) -> str:
     lines = [f"<b>{escape(source)}</b> {doing}{late}"]
     if status.log:
         lines.append(f'<span style="color:#5c6670">recording {escape(Path(status.log).name)}</span>')
-    told = (status.fault, status.log_state, *(f"outside the model's validity: {text}" for text in status.warnings))
-    lines += [f'<span style="color:#D55E00">{escape(text)}</span>' for text in told if text]
+    problems = (status.fault, status.log_state, *(f"outside the model's validity: {text}" for text in status.warnings))
+    lines += [f'<span style="color:#D55E00">{escape(text)}</span>' for text in problems if text]
     return f'<div style="margin-top:4px;line-height:1.4">{"<br>".join(lines)}</div>'

@@ -44,7 +44,7 @@ TRAIL_PERIOD, TRAIL_POINTS = 0.25, 240  # s of simulation time between points
 RESET_DISTANCE, RESET_SPEED = 0.5, 100.0  # m and m/s: what is further or faster is no flight but a reset
 ARROW_OF_WEIGHT = 0.5  # m, arrow of a rotor that carries its share of the weight
 ARROW_OF_MOMENT = 6.0  # m, arrow of a moment of that share at 1 m
-LEAST_ARROW = 1e-3  # m
+MIN_ARROW_LENGTH = 1e-3  # m
 # Viridis (Smith and van der Walt) at nine places: lightness grows evenly, and all people see it alike.
 COLOURS = np.array(
     [
@@ -134,12 +134,12 @@ class Scene:
         def apart(cell: float) -> str:
             return f"lines {cell:g} m and {10.0 * cell:g} m apart"
 
-        told = [f"height of the origin: {apart(self.cell)}"] if self._level.visible else []
+        labels = [f"height of the origin: {apart(self.cell)}"] if self._level.visible else []
         if self._ground is not None:
             side = "below" if self._ground < 0.0 else "above"
             where = f"{abs(self._ground):g} m {side} the origin" if self._level.visible else "at the origin's height"
-            told.append(f"ground, {where}: {apart(float(self._ground_plane.cell_size))}")
-        return told
+            labels.append(f"ground, {where}: {apart(float(self._ground_plane.cell_size))}")
+        return labels
 
     def set_ground(self, altitude: float | None) -> None:
         """Draw level ground at a height above the origin [m], or none; the grid at the origin's height stays."""
@@ -236,7 +236,7 @@ class RotorNodes:
             (self._thrust, loads[R.THRUST] / self._whole.newtons_per_metre * self._up),
             (self._moment, loads[R.MOMENT : R.MOMENT + 3] / self._whole.moment_per_metre),
         ):
-            there = shown.arrows and float(np.linalg.norm(vector)) > LEAST_ARROW * self._whole.scale
+            there = shown.arrows and float(np.linalg.norm(vector)) > MIN_ARROW_LENGTH * self._whole.scale
             _show(node, there)
             if there:
                 node.points = np.array([[self._rotor.hub, self._rotor.hub + vector]], dtype=np.float32)
@@ -282,8 +282,8 @@ class Trail:
     def draw(self, time: float, position: Array, shown: bool) -> None:
         """Go on to a position, NED [m]; a reset, which no flight could do, begins a new trail."""
         if self._before is not None:
-            since, place = self._before
-            if time < since or math.dist(place, position) > RESET_DISTANCE + RESET_SPEED * (time - since):
+            since, last = self._before
+            if time < since or math.dist(last, position) > RESET_DISTANCE + RESET_SPEED * (time - since):
                 self.clear()
         self._before = (time, position.copy())
         if time - self._last >= TRAIL_PERIOD:
@@ -307,8 +307,8 @@ def colour_of(values: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
     ndarray of uint8, shape (..., 3)
     """
     low, high = limits
-    places = np.clip((values - low) / (high - low), 0.0, 1.0) * (len(COLOURS) - 1)
-    channels = [np.interp(places, np.arange(len(COLOURS)), COLOURS[:, i]) for i in range(3)]
+    fractions = np.clip((values - low) / (high - low), 0.0, 1.0) * (len(COLOURS) - 1)
+    channels = [np.interp(fractions, np.arange(len(COLOURS)), COLOURS[:, i]) for i in range(3)]
     return np.stack(channels, axis=-1).astype(np.uint8)
 
 
@@ -355,8 +355,8 @@ def _add_grids(scene: Any, name: str, scale: float, cell: float) -> tuple[Any, A
 def _add_fuselage(scene: Any, name: str, aircraft: Aircraft, scale: float) -> None:
     """A body that shows where the nose is, and beams to the hubs."""
     length = 0.4 * geometry.size(aircraft)
-    place = f"{name}/body/fuselage"
-    scene.add_icosphere(place, 1.0, color=FUSELAGE, scale=(length, 0.26 * length, 0.24 * length), cast_shadow=False)
+    path = f"{name}/body/fuselage"
+    scene.add_icosphere(path, 1.0, color=FUSELAGE, scale=(length, 0.26 * length, 0.24 * length), cast_shadow=False)
     scene.add_icosphere(
         f"{name}/body/nose",
         1.0,

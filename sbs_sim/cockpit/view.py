@@ -12,11 +12,13 @@ from viser import ViserServer
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
 from sbs_sim.cockpit.charts import ChartColumn, body_charts, rotor_charts
+from sbs_sim.cockpit.fly_panel import GONE, LOG_SHOWN, FlyPanel, Pilot
 from sbs_sim.cockpit.keys import Keyed, add_keys
-from sbs_sim.cockpit.panels import GONE, LOG_SHOWN, Answer, FlyPanel, LogPanel, Pilot
-from sbs_sim.cockpit.playback import Recording, recordings
+from sbs_sim.cockpit.log_panel import LogPanel
+from sbs_sim.cockpit.panel_tools import Answer
 from sbs_sim.cockpit.poles import Pole, pole_page
 from sbs_sim.cockpit.readouts import Status, readout, source_line
+from sbs_sim.cockpit.recorded_snapshots import RecordedSnapshots, list_logs
 from sbs_sim.cockpit.scene import COLOURS, MOMENT, PATH, THRUST, Scene, Shown
 from sbs_sim.cockpit.viewpoint import ViewPanel, Viewpoint
 from sbs_sim.errors import SbsError
@@ -38,7 +40,7 @@ NO_MODEL = '<div style="font:12px sans-serif;padding:10px">No linear model yet: 
 
 
 @dataclass(frozen=True)
-class Flown:
+class LiveFlight:
     """What a simulator flies.
 
     Attributes
@@ -59,14 +61,14 @@ class Flown:
 
 
 @dataclass(frozen=True)
-class Live:
+class LiveState:
     """A flight as it is right now.
 
     Attributes
     ----------
     snapshot : Snapshot
     lead : float
-        Simulation time that has gone since the snapshot [s].
+        Simulation time since the snapshot [s].
     status : Status
     gone : bool
         The simulator says nothing any more.
@@ -91,11 +93,11 @@ class View:
         Where the logs are.
     """
 
-    def __init__(self, server: ViserServer, pilot: Pilot, live: Callable[[], Live | None], folder: Path) -> None:
+    def __init__(self, server: ViserServer, pilot: Pilot, live: Callable[[], LiveState | None], folder: Path) -> None:
         self._server, self._pilot, self._live = server, pilot, live
-        self._flown: Flown | None = None  # live
-        self._recording: Recording | None = None
-        self._place = 0.0
+        self._live_flight: LiveFlight | None = None  # live
+        self._recording: RecordedSnapshots | None = None
+        self._log_time = 0.0
         self._lock = threading.RLock()  # callbacks of the page come in threads of their own
         self._frames = 0
         self._shown = Shown()
@@ -121,7 +123,7 @@ class View:
         with self._fly_tab:
             self._no_flight = gui.add_html(NO_FLIGHT)
         with tabs.add_tab("Logs"):
-            self._logs = LogPanel(self._server, lambda: recordings(folder), self.show)
+            self._logs = LogPanel(self._server, lambda: list_logs(folder), self.show)
         with tabs.add_tab("View"):
             ViewPanel(self._server, self._shown, self._viewpoint)
             self._legend = gui.add_html("")
@@ -149,37 +151,37 @@ class View:
 
     # -------------------------------------------------------------------------------------------------- what to show
 
-    def fly(self, flown: Flown) -> None:
+    def show_flight(self, flight: LiveFlight) -> None:
         """Offer a live flight, and show it if no log is being shown."""
         with self._lock:
-            self._flown = flown
+            self._live_flight = flight
             if self._fly is None:
                 self._no_flight.remove()
                 with self._fly_tab:
                     self._fly = FlyPanel(self._server, self._pilot, self._here, self._back)
-            self._fly.use(flown.aircraft, flown.effects, flown.pace)
+            self._fly.use(flight.aircraft, flight.effects, flight.pace)
             self._logs.offer_live(self._recording is None)
             if self._recording is None:
-                self._use(flown.aircraft, flown.ground)
+                self._use(flight.aircraft, flight.ground)
 
     def show(self, path: Path | None) -> Answer:
         """Show a log from its beginning, or the live flight; a log that cannot be shown changes nothing."""
         try:
-            recording = None if path is None else Recording(path)
+            recording = None if path is None else RecordedSnapshots(path)
         except SbsError as error:
             return False, str(error)
         with self._lock:
             self._recording = recording
             if recording is None:
                 self._logs.enable(None)
-                if self._flown is not None:
-                    self._use(self._flown.aircraft, self._flown.ground)
+                if self._live_flight is not None:
+                    self._use(self._live_flight.aircraft, self._live_flight.ground)
                 return True, ""
-            self._place = recording.beginning
+            self._log_time = recording.beginning
             self._use(recording.aircraft, recording.ground)
             self._logs.enable(recording.times)
-        whole = "" if recording.complete else ", not complete"
-        return True, f"{recording.aircraft.name}, {recording.end - recording.beginning:.1f} s{whole}"
+        note = "" if recording.complete else ", not complete"
+        return True, f"{recording.aircraft.name}, {recording.end - recording.beginning:.1f} s{note}"
 
     def _back(self) -> None:
         """Show the live flight."""
@@ -187,7 +189,7 @@ class View:
         self.show(None)
 
     def show_wind(self, velocity: Array, turbulence: float) -> None:
-        """Show what wind somebody has set."""
+        """Show the wind that was set."""
         if self._fly is not None:
             self._fly.show_wind(velocity, turbulence)
 
@@ -246,7 +248,7 @@ class View:
                     self._fly.steer(LOG_SHOWN if self._recording is not None else GONE if gone else "")
             if shown is None or self._scene is None:
                 return
-            if not self._server.get_clients():  # nobody looks: only the histories go on
+            if not self._server.get_clients():  # no client: only the histories go on
                 for column in self._columns:
                     column.history.add(shown.snapshot)
                 return
@@ -255,7 +257,7 @@ class View:
             if live is not None and self._fly is not None and self._frames % READOUT_EVERY == 0:
                 self._fly.update(live.snapshot.swashplate, live.status.playing, bool(live.status.log))
 
-    def _draw(self, shown: Live, scene: Scene) -> None:
+    def _draw(self, shown: LiveState, scene: Scene) -> None:
         snapshot = shown.snapshot
         scene.draw(snapshot, shown.lead)
         for column in self._columns:
@@ -267,19 +269,19 @@ class View:
             for column in self._columns:
                 column.update()
 
-    def _replayed(self, recording: Recording, elapsed: float) -> Live:
+    def _replayed(self, recording: RecordedSnapshots, elapsed: float) -> LiveState:
         """Instant of a log; the slider and the clock move it."""
         rate = self._logs.speed
         if self._logs.moved:
             self._logs.moved = False
-            self._place = min(max(float(self._logs.place.value), recording.beginning), recording.end)
+            self._log_time = min(max(float(self._logs.time_slider.value), recording.beginning), recording.end)
             self._forget()
         elif self._logs.playing.value:
-            self._place = min(self._place + rate * elapsed, recording.end)
+            self._log_time = min(self._log_time + rate * elapsed, recording.end)
             if self._frames % READOUT_EVERY == 0:
-                self._logs.place.value = round(self._place, 2)
-        playing = bool(self._logs.playing.value) and self._place < recording.end
-        return Live(recording.at(self._place), 0.0, Status(playing, rate if playing else 0.0))
+                self._logs.time_slider.value = round(self._log_time, 2)
+        playing = bool(self._logs.playing.value) and self._log_time < recording.end
+        return LiveState(recording.at(self._log_time), 0.0, Status(playing, rate if playing else 0.0))
 
 
 def _same(one: Aircraft, other: Aircraft) -> bool:

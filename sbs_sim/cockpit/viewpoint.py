@@ -6,7 +6,7 @@ from viser import ViserServer
 
 from sbs_sim.cockpit.scene import Shown
 
-LARGEST_MAGNIFICATION = 20.0
+MAX_MAGNIFICATION = 20.0
 # In the viewer's axes, north, west, up, for an aircraft of the reference size of the scene [m].
 CAMERAS = {"behind": (-2.0, 1.2, 1.0), "left": (0.0, 2.6, 0.3), "above": (-0.01, 0.0, 3.0), "front": (2.2, 0.7, 0.6)}
 FIRST = "behind"
@@ -24,7 +24,7 @@ class Viewpoint:
     def __init__(self, server: ViserServer) -> None:
         self._server, self._scale = server, 1.0
         self._set_first()
-        server.on_client_connect(lambda client: self.place(client, FIRST))
+        server.on_client_connect(lambda client: self.set_camera(client, FIRST))
 
     def _set_first(self) -> None:
         camera = self._server.initial_camera
@@ -41,8 +41,8 @@ class Viewpoint:
                 client.camera.position = position
                 client.camera.look_at = look_at  # last: a camera that is moved goes on to look the same way
 
-    def place(self, client: Any, name: str) -> None:
-        """Look at the aircraft from one of the places."""
+    def set_camera(self, client: Any, name: str) -> None:
+        """Look at the aircraft from one of the CAMERAS."""
         if client is not None and name in CAMERAS:
             aspect = client.camera.aspect  # of whoever connects: it may be anything
             distance = self._scale * (max(1.0, NARROW / aspect) if 0.1 < aspect < 10.0 else 1.0)
@@ -66,7 +66,7 @@ class ViewPanel:
         magnification = gui.add_slider(
             "Flap, lag ×",
             1.0,
-            LARGEST_MAGNIFICATION,
+            MAX_MAGNIFICATION,
             0.5,
             shown.magnification,
             hint="flap and lag angles are drawn that much larger",
@@ -82,9 +82,9 @@ class ViewPanel:
             box = gui.add_checkbox(label, getattr(shown, field))
             box.on_update(lambda _, field=field, box=box: setattr(shown, field, box.value))
         cameras = gui.add_button_group("From", tuple(CAMERAS))
-        cameras.on_click(lambda event: viewpoint.place(event.client, event.target.value))
+        cameras.on_click(lambda event: viewpoint.set_camera(event.client, event.target.value))
 
 
 def _magnify(shown: Shown, value: float) -> None:
-    if 1.0 <= value <= LARGEST_MAGNIFICATION:  # false for a NaN as well
+    if 1.0 <= value <= MAX_MAGNIFICATION:  # false for a NaN as well
         shown.magnification = value

@@ -84,11 +84,11 @@ def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.analysis.linearize import linearize
     from sbs_sim.output.files import check_target, write
     from sbs_sim.output.json_text import to_json
-    from sbs_sim.pilot.flight import MOST_DELAY
     from sbs_sim.pilot.hover_hold import HoverModel, design
+    from sbs_sim.pilot.piloted_flight import MAX_DELAY
 
-    if not 0 <= arguments.delay <= MOST_DELAY:
-        raise UsageError(f"--delay {arguments.delay}: allowed are 0 to {MOST_DELAY} ticks")
+    if not 0 <= arguments.delay <= MAX_DELAY:
+        raise UsageError(f"--delay {arguments.delay}: allowed are 0 to {MAX_DELAY} ticks")
     if not 1.0 <= arguments.duration <= LONGEST:
         raise UsageError(f"--duration {arguments.duration:g}: allowed are 1 to {LONGEST:g} s")
     check_target(arguments.json)
@@ -133,10 +133,10 @@ def _airs(arguments: argparse.Namespace) -> dict[str, tuple["Wind", float, float
 def _flown(
     craft: "Aircraft", model: "LinearModel", found: "HoverHoldDesign", air: "Wind", duration: float, delay: int
 ) -> Any:
-    from sbs_sim.pilot.flight import fly
     from sbs_sim.pilot.hover_hold import HoverHold
+    from sbs_sim.pilot.piloted_flight import simulate_with_pilot
 
-    return fly(craft, model.trim, HoverHold(found).controls, duration, wind=air, delay=delay)
+    return simulate_with_pilot(craft, model.trim, HoverHold(found).controls, duration, wind=air, delay=delay)
 
 
 def _figures(flight: Any, settling: float) -> dict[str, float]:

@@ -24,16 +24,20 @@ from sbs_sim.analysis.sweep import SweepPoint, sweep
 from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError
 from sbs_sim.flight_loop import FlightLoop
-from sbs_sim.nodes.conversions import model_message, sweep_messages, trim_message
-from sbs_sim.nodes.host import LATCHED_QOS, SERVICE_QOS, Component, Log, Parameter, Topic, declare, run
+from sbs_sim.nodes.analysis_conversions import model_message, sweep_messages, trim_message
+from sbs_sim.nodes.component import Component
+from sbs_sim.nodes.parameters import Parameter, declare
+from sbs_sim.nodes.process import run
+from sbs_sim.nodes.qos import LATCHED_QOS, SERVICE_QOS
+from sbs_sim.nodes.recorded_publisher import MessageLog, RecordedPublisher
 from sbs_sim.nodes.threaded_action import ThreadedActionServer
 
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
 }
 CONDITION = ("airspeed", "climb_rate", "sideslip", "turn_rate", "lead_lag", "cyclic_inflow", "azimuth_count")
-MOST_POINTS = 1000  # of a sweep; its result is one message, some 50 kB for each of them
-TURN_PATIENCE = 2.0  # s that a sweep waits for the end of the one before, which may just have been cancelled
+MAX_POINTS = 1000  # of a sweep; its result is one message, some 50 kB for each of them
+SWEEP_LOCK_TIMEOUT = 2.0  # s that a sweep waits for the end of the one before, which may just have been cancelled
 
 
 class Analysis(Component):
@@ -43,11 +47,11 @@ class Analysis(Component):
     ----------
     loop : FlightLoop, optional
         The flight, if it is in the same process: its aircraft is the one; else a parameter names it.
-    log : Log, optional
+    log : MessageLog, optional
         Where results are recorded.
     """
 
-    def __init__(self, loop: FlightLoop | None = None, log: Log | None = None) -> None:
+    def __init__(self, loop: FlightLoop | None = None, log: MessageLog | None = None) -> None:
         super().__init__("analysis")
         self._loop = loop
         self._aircraft = Aircraft.load(declare(self, PARAMETERS)["aircraft"]) if loop is None else loop.aircraft
@@ -56,8 +60,8 @@ class Analysis(Component):
         self._turn = threading.Lock()
         with contextlib.suppress(SbsError):  # load now what the first caller would have to wait for
             model_message(self._aircraft, linearize(self._aircraft))
-        self._trim_point = Topic(self, TrimPoint, "trim_point", LATCHED_QOS, log)
-        self._linear_model = Topic(self, LinearModel, "linear_model", LATCHED_QOS, log)
+        self._trim_point = RecordedPublisher(self, TrimPoint, "trim_point", LATCHED_QOS, log)
+        self._linear_model = RecordedPublisher(self, LinearModel, "linear_model", LATCHED_QOS, log)
         self.create_service(Trim, "trim", self._on_trim, qos_profile=SERVICE_QOS)
         self.create_service(Linearize, "linearize", self._on_linearize, qos_profile=SERVICE_QOS)
         self._sweeps = ThreadedActionServer(self, Sweep, "sweep", self._sweep, self.workers)
@@ -108,7 +112,7 @@ class Analysis(Component):
             goal.publish_feedback(_feedback(point, visited, total))
 
         def act() -> None:
-            if not self._turn.acquire(timeout=TURN_PATIENCE):
+            if not self._turn.acquire(timeout=SWEEP_LOCK_TIMEOUT):
                 raise SbsError("another sweep is under way: cancel it, or wait for its end")
             try:
                 result.points = self._points(goal, tell)
@@ -126,8 +130,8 @@ class Analysis(Component):
 
     def _points(self, goal: ServerGoalHandle, tell: Callable[[SweepPoint, int, int], None]) -> list[Any]:
         request = goal.request
-        if len(request.values) > MOST_POINTS:
-            raise SbsError(f"values: {len(request.values)} of them, allowed are 1 to {MOST_POINTS}")
+        if len(request.values) > MAX_POINTS:
+            raise SbsError(f"values: {len(request.values)} of them, allowed are 1 to {MAX_POINTS}")
         condition = _condition(request)
         if condition.get(request.parameter) == 0.0:  # what a request has that does not say it
             del condition[request.parameter]

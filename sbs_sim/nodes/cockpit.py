@@ -19,20 +19,21 @@ from typing import TYPE_CHECKING
 import rclpy.utilities
 
 from sbs_sim.errors import SbsError
+from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.confinement import alone_in_domain
-from sbs_sim.nodes.host import DISCOVERY, Component, run
+from sbs_sim.nodes.process import DISCOVERY_TIME, run
 from sbs_sim.terminal.command_line import Parser
 
 if TYPE_CHECKING:
     from sbs_sim.nodes.cockpit_node import Cockpit
 
 HOST, PORT = "127.0.0.1", 8080
-END_PATIENCE = 15.0  # s that a simulator may take to close its log
+SHUTDOWN_TIMEOUT = 15.0  # s that a simulator may take to close its log
 START_HEIGHT = 10.0  # m above the origin, of a flight that the cockpit starts
 DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG
 
 
-class Simulator:
+class SimulatorProcess:
     """A simulator in a process of its own, which ends with this one.
 
     Parameters
@@ -63,7 +64,7 @@ class Simulator:
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
         try:
-            return self._process.wait(END_PATIENCE)
+            return self._process.wait(SHUTDOWN_TIMEOUT)
         except subprocess.TimeoutExpired:
             self._process.kill()
             return self._process.wait()
@@ -74,8 +75,8 @@ def _end_with_parent() -> None:
     ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGINT)
 
 
-class Start:
-    """What the command line asks for: a cockpit, and a simulator if there is to be one.
+class CockpitStartup:
+    """Starts the cockpit, and a simulator unless it joins one that runs already.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ class Start:
     def __init__(self, options: argparse.Namespace, ros_arguments: list[str], end: threading.Event) -> None:
         self._options, self._ros_arguments, self._end = options, ros_arguments, end
         self._cockpit: Cockpit | None = None
-        self._simulator: Simulator | None = None
+        self._simulator: SimulatorProcess | None = None
 
     def nodes(self) -> list[Component]:
         """Make everything.
@@ -105,13 +106,13 @@ class Start:
         try:
             certain = not alone and alone_in_domain(lookout.context.get_domain_id())
             if certain:
-                self._simulator = Simulator(self._ros_arguments, self._end)
+                self._simulator = SimulatorProcess(self._ros_arguments, self._end)
             # meanwhile the flight begins, or the lookout discovers others
             from sbs_sim.nodes.cockpit_node import Cockpit
 
             if not alone and not certain:
-                _refuse_second_simulator(lookout, since + 2 * DISCOVERY)  # half of it goes by importing
-                self._simulator = Simulator(self._ros_arguments, self._end)
+                _refuse_second_simulator(lookout, since + 2 * DISCOVERY_TIME)  # half of it goes by importing
+                self._simulator = SimulatorProcess(self._ros_arguments, self._end)
         finally:
             lookout.destroy_node()
         self._cockpit = Cockpit(host, port, self._end, not alone, folder)
@@ -133,7 +134,7 @@ def main(args: list[str] | None = None) -> None:
     if (options.attach or options.logs) and (given := {"-p", "--param", "--params-file"} & set(ros_arguments)):
         make_parser().error(f"{min(given)}: parameters are those of a simulator: not allowed with --attach and --logs")
     end = threading.Event()
-    start = Start(options, ros_arguments, end)
+    start = CockpitStartup(options, ros_arguments, end)
     code = run(start.nodes, [arguments[0], *ros_arguments], end, first="cockpit")
     sys.exit(start.finish() or code)
 

@@ -26,26 +26,28 @@ from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, LinearModel, Rotor
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
 from sbs_sim.analysis.linearize import linearize
-from sbs_sim.cockpit.gate import guarded
+from sbs_sim.cockpit.access import access_check
 from sbs_sim.cockpit.poles import Pole
 from sbs_sim.cockpit.readouts import Status
-from sbs_sim.cockpit.told import condition_words
-from sbs_sim.cockpit.view import FRAME_PERIOD, Flown, Live, View
+from sbs_sim.cockpit.trim_report import condition_words
+from sbs_sim.cockpit.view import FRAME_PERIOD, LiveFlight, LiveState, View
 from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.model.state import SWASHPLATE_NAMES
+from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.conversions import snapshot_of, to_seconds
-from sbs_sim.nodes.host import COMPLAINT_PERIOD, EVENT_QOS, LATCHED_QOS, Component
+from sbs_sim.nodes.qos import EVENT_QOS, LATCHED_QOS
+from sbs_sim.nodes.rejections import WARNING_PERIOD
 from sbs_sim.nodes.remote_pilot import RemotePilot
 
 Array = NDArray[np.float64]
 
-# Only the newest matters, and a page that falls behind must not hold up the flight.
+# Only the newest matters, and a page that falls behind must not delay the flight.
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 MESSAGES = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "status": SimulationStatus}
-LONGEST_LEAD = 0.1  # s of simulation time that rotors are turned on without a message
-SILENCE = 3.0  # s without a message: the flight is gone
-LONGEST_REST = 0.2  # s between two pictures
-LOOK_PERIOD = 0.1  # s between looks for a simulator
+MAX_EXTRAPOLATION = 0.1  # s of simulation time that rotors are turned on without a message
+MESSAGE_TIMEOUT = 3.0  # s without a message after which the flight counts as lost
+MAX_FRAME_INTERVAL = 0.2  # s between two pictures
+POLL_PERIOD = 0.1  # s between looks for a simulator
 NICE = 5  # the flight comes before its picture
 
 
@@ -60,7 +62,7 @@ class Cockpit(Component):
     end : threading.Event
         Set when there is nothing to show any more.
     pause : bool
-        Wait for a flight and pause it before the page is served: nobody holds its controls yet. Else the page is served
+        Wait for a flight and pause it before the page is served: no pilot has its controls yet. Else the page is served
         at once, and flights come and go.
     folder : Path
         Where the logs are.
@@ -68,7 +70,7 @@ class Cockpit(Component):
 
     def __init__(self, host: str, port: int, end: threading.Event, pause: bool, folder: Path) -> None:
         super().__init__("cockpit")
-        self._place, self._end, self._pause, self._folder = (host, port), end, pause, folder
+        self._address, self._end, self._pause, self._folder = (host, port), end, pause, folder
         self._newest: dict[str, bytes] = {}
         self._arrived = 0.0
         self._swashplate: Array | None = None
@@ -76,7 +78,7 @@ class Cockpit(Component):
         self._model: LinearModel | None = None
         self._pilot = RemotePilot(self)
         self._aircraft: Aircraft | None = None
-        self._found: Flown | None = None  # that another simulator has begun to fly
+        self._found: LiveFlight | None = None  # flight of another simulator
         self._told_wind: tuple[Array, float] | None = None
         self.failed = False
         for name, kind in MESSAGES.items():
@@ -97,7 +99,7 @@ class Cockpit(Component):
         self._newest[name] = data
         self._arrived = time.monotonic()  # status comes while the flight is paused, too
         if name == "state" and self._pilot.follows_time:
-            with contextlib.suppress(SbsError):  # told where it is drawn
+            with contextlib.suppress(SbsError):  # reported where it is drawn
                 self._pilot.tick(to_seconds(_message(data, BodyState).header.stamp))
 
     def _on_event(self, event: FlightEvent) -> None:
@@ -114,29 +116,29 @@ class Cockpit(Component):
     def _on_model(self, model: LinearModel) -> None:
         self._model = model
 
-    def _live(self) -> Live | None:
+    def _live(self) -> LiveState | None:
         """The flight of the newest messages; None before there is one, or while they cannot be drawn."""
         aircraft, swashplate = self._aircraft, self._swashplate
         try:
             newest = {name: _message(data, MESSAGES[name]) for name, data in dict(self._newest).items()}
             if len(newest) < len(MESSAGES) or swashplate is None or aircraft is None:
                 return None
-            told = newest["status"]
+            status = newest["status"]
             # those of the next simulator are refused here, until its aircraft is known
             snapshot = snapshot_of(
                 aircraft, newest["state"], newest["rotors"], newest["inflow"], swashplate, self._wind
             )
-            _check_status(told)
+            _check_status(status)
         except SbsError as error:
-            self.get_logger().warning(f"not drawn: {error}", throttle_duration_sec=COMPLAINT_PERIOD)
+            self.get_logger().warning(f"not drawn: {error}", throttle_duration_sec=WARNING_PERIOD)
             return None
         if len(swashplate) != len(aircraft.rotors):
             return None
-        playing, age = told.state == SimulationStatus.PLAYING, time.monotonic() - self._arrived
-        if gone := age > SILENCE:
-            told.fault = told.fault or f"no message of the simulator for {age:.0f} s"
-        lead = min(age * told.real_time_factor, LONGEST_LEAD) if playing else 0.0
-        return Live(snapshot, lead, _status(told), gone)
+        playing, age = status.state == SimulationStatus.PLAYING, time.monotonic() - self._arrived
+        if gone := age > MESSAGE_TIMEOUT:
+            status.fault = status.fault or f"no message of the simulator for {age:.0f} s"
+        lead = min(age * status.real_time_factor, MAX_EXTRAPOLATION) if playing else 0.0
+        return LiveState(snapshot, lead, _status(status), gone)
 
     # --------------------------------------------------------------------------------------------------- the page
 
@@ -164,17 +166,17 @@ class Cockpit(Component):
         return False
 
     def _look_out(self) -> None:
-        """Learn what is flown whenever a simulator begins to be heard."""
+        """Find out what is flown whenever a simulator is discovered."""
         known = False
-        while not self._end.wait(LOOK_PERIOD):
-            if time.monotonic() - self._arrived > SILENCE:
+        while not self._end.wait(POLL_PERIOD):
+            if time.monotonic() - self._arrived > MESSAGE_TIMEOUT:
                 known = False
-            elif not known and (told := self._pilot.settings()) is not None:
+            elif not known and (settings := self._pilot.settings()) is not None:
                 known = True
                 try:
-                    aircraft = Aircraft.load(told["aircraft"])
-                    self._found = Flown(
-                        aircraft, self._effects(aircraft), told["ground_altitude"], told["real_time_factor"]
+                    aircraft = Aircraft.load(settings["aircraft"])
+                    self._found = LiveFlight(
+                        aircraft, self._effects(aircraft), settings["ground_altitude"], settings["real_time_factor"]
                     )
                 except SbsError as error:
                     self.get_logger().error(f"the simulator's aircraft cannot be shown: {error}")
@@ -188,7 +190,7 @@ class Cockpit(Component):
             return ()
 
     def _draw_all(self) -> None:
-        host, port = self._place
+        host, port = self._address
         server = serve(host, port)
         view = View(server, self._pilot, self._live, self._folder)
         print(f"cockpit: http://{host}:{port}", flush=True)
@@ -199,10 +201,10 @@ class Cockpit(Component):
                 self._draw(view, now - before)
             except Exception:  # the end of the page would be that of the flight
                 text = f"internal error: {traceback.format_exc()}"
-                self.get_logger().error(text, throttle_duration_sec=COMPLAINT_PERIOD)
+                self.get_logger().error(text, throttle_duration_sec=WARNING_PERIOD)
             before, drawn = now, time.monotonic()
             # where drawing is slow, on a busy machine, it takes half of the time at most
-            due = max(due + FRAME_PERIOD, drawn + min(drawn - now, LONGEST_REST))
+            due = max(due + FRAME_PERIOD, drawn + min(drawn - now, MAX_FRAME_INTERVAL))
             self._end.wait(due - time.monotonic())
         server.stop()
 
@@ -210,7 +212,7 @@ class Cockpit(Component):
         found, self._found = self._found, None
         if found is not None:
             self._aircraft = found.aircraft
-            view.fly(found)
+            view.show_flight(found)
         wind = self._told_wind
         if wind is not None and self._aircraft is not None:
             self._told_wind = None
@@ -224,28 +226,28 @@ class Cockpit(Component):
 
 
 def _message(data: bytes, kind: Any) -> Any:
-    """Message of its bytes, which are whatever somebody has sent."""
+    """Message of its bytes, which come from any sender."""
     try:
         return deserialize_message(data, kind)
     except Exception as error:  # rclpy has errors of several kinds for that
         raise SimulationError(f"no {kind.__name__}: {' '.join(str(error).split())}") from None
 
 
-def _check_status(told: SimulationStatus) -> None:
-    if not math.isfinite(told.real_time_factor):
-        raise SimulationError(f"real_time_factor = {told.real_time_factor}: allowed are finite numbers")
+def _check_status(status: SimulationStatus) -> None:
+    if not math.isfinite(status.real_time_factor):
+        raise SimulationError(f"real_time_factor = {status.real_time_factor}: allowed are finite numbers")
 
 
-def _status(told: SimulationStatus) -> Status:
-    lost = f"{told.log_dropped} messages not recorded " if told.log_dropped else ""
+def _status(status: SimulationStatus) -> Status:
+    lost = f"{status.log_dropped} messages not recorded " if status.log_dropped else ""
     return Status(
-        told.state == SimulationStatus.PLAYING,
-        told.real_time_factor,
-        told.missed_deadlines,
-        told.fault,
-        told.log,
-        f"{lost}{told.log_fault}".strip(),
-        tuple(told.warnings),
+        status.state == SimulationStatus.PLAYING,
+        status.real_time_factor,
+        status.missed_deadlines,
+        status.fault,
+        status.log,
+        f"{lost}{status.log_fault}".strip(),
+        tuple(status.warnings),
     )
 
 
@@ -260,7 +262,7 @@ def serve(host: str, port: int) -> ViserServer:
     rich.get_console().quiet = True  # viser prints through it
     # what is no request at all, such as a look whether the port is open, is no error of ours with pages of traceback
     logging.getLogger("websockets.server").addFilter(lambda record: record.getMessage() != "opening handshake failed")
-    with guarded(host):
+    with access_check(host):
         server = ViserServer(host, port, verbose=False)
     server.request_share_url = lambda verbose=True: None  # a page could ask for it
     if server.get_port() != port:  # viser goes on to the next port that is free

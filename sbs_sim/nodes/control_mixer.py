@@ -19,22 +19,15 @@ from sbs_sim.errors import SbsError
 from sbs_sim.flight.mixer import Mixer
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import SWASHPLATE_NAMES
-from sbs_sim.nodes.arrivals import Arrivals
+from sbs_sim.nodes.command_monitor import CommandMonitor
+from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, swashplate_messages, to_seconds, to_time
-from sbs_sim.nodes.host import (
-    COMMAND_QOS,
-    COMPLAINT_PERIOD,
-    EVENT_QOS,
-    HEALTH_PERIOD,
-    STATE_QOS,
-    Component,
-    Log,
-    Parameter,
-    Topic,
-    declare,
-    diagnostic,
-    run,
-)
+from sbs_sim.nodes.diagnostics import DIAGNOSTICS_PERIOD, diagnostic_status
+from sbs_sim.nodes.parameters import Parameter, declare
+from sbs_sim.nodes.process import run
+from sbs_sim.nodes.qos import COMMAND_QOS, EVENT_QOS, STATE_QOS
+from sbs_sim.nodes.recorded_publisher import MessageLog, RecordedPublisher
+from sbs_sim.nodes.rejections import WARNING_PERIOD
 
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
@@ -49,14 +42,14 @@ class ControlMixer(Component):
     Parameters
     ----------
     loop : FlightLoop, optional
-        The flight, if it is in the same process: the mixer then knows the time, where the swashplates stand and of
-        resets. Else time comes from `clock` of its namespace, and where the swashplates stand from the events of the
+        The flight, if it is in the same process: the mixer then knows the time, the swashplate angles and
+        resets. Else time comes from `clock` of its namespace, and the swashplate angles from the events of the
         flight; until one comes, they are taken to be at the first target.
-    log : Log, optional
+    log : MessageLog, optional
         Where accepted controls and the diagnostics are recorded.
     """
 
-    def __init__(self, loop: FlightLoop | None = None, log: Log | None = None) -> None:
+    def __init__(self, loop: FlightLoop | None = None, log: MessageLog | None = None) -> None:
         super().__init__("control_mixer")
         self._loop = loop
         self._mixer = Mixer(Aircraft.load(declare(self, PARAMETERS)["aircraft"]) if loop is None else loop.aircraft)
@@ -64,25 +57,25 @@ class ControlMixer(Component):
         self._moved_at = -1.0
         self._last_seen: dict[str, float] = {}
         self._output = self.create_publisher(SwashplateArray, "swashplate", COMMAND_QOS)
-        self._health = Topic(self, DiagnosticArray, "diagnostics", STATE_QOS, log)
-        self._arrivals = Arrivals(self, Controls, "controls", COMMAND_QOS, log)
+        self._health = RecordedPublisher(self, DiagnosticArray, "diagnostics", STATE_QOS, log)
+        self._commands = CommandMonitor(self, Controls, "controls", COMMAND_QOS, log)
         self.create_subscription(Controls, "controls", self._on_controls, COMMAND_QOS)
         if loop is None:
             # The simulator owns time: rates are those of simulated time, and a pause holds the swashplates. Not by
             # use_sim_time, which listens to the one /clock of all namespaces.
-            self._told_time = 0.0
+            self._clock_time = 0.0
             self._time = self.create_subscription(ClockMessage, "clock", self._on_clock, CLOCK_QOS)
             self.create_subscription(FlightEvent, "events", self._on_event, EVENT_QOS)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._ramp = self.create_timer(RAMP_PERIOD, self._go_on, clock=steady, autostart=False)
-        self.create_timer(HEALTH_PERIOD, self._publish_health, clock=steady)
+        self._ramp = self.create_timer(RAMP_PERIOD, self._continue, clock=steady, autostart=False)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_health, clock=steady)
 
     def _now(self) -> float:
         """Simulation time [s]."""
-        return self._told_time if self._loop is None else self._loop.time
+        return self._clock_time if self._loop is None else self._loop.time
 
     def _on_clock(self, message: ClockMessage) -> None:
-        self._told_time = to_seconds(message.clock)
+        self._clock_time = to_seconds(message.clock)
 
     def _follow_resets(self) -> bool:
         """Forget what was commanded before a reset; true if there was one."""
@@ -95,7 +88,7 @@ class ControlMixer(Component):
     def _on_event(self, message: FlightEvent) -> None:
         """What was commanded before the aircraft was put somewhere is void."""
         if message.kind in (FlightEvent.START, FlightEvent.RESET):
-            self._arrivals.restart()
+            self._commands.restart()
             angles = np.array(message.swashplate).reshape(-1, len(SWASHPLATE_NAMES))
             self._mixer.forget()
             if len(angles) == len(self._mixer.aircraft.rotors):  # else it is another aircraft's
@@ -104,17 +97,17 @@ class ControlMixer(Component):
     def _on_controls(self, message: Controls) -> None:
         self._follow_resets()
         try:
-            self._arrivals.check(message)
+            self._commands.check(message)
             self._mixer.set_target(controls_array(message))
             if self._loop is not None and self._mixer.rests:
                 self._mixer.stand(self._loop.swashplate())
         except SbsError as error:
-            self._arrivals.add(error)
+            self._commands.add(error)
             return
-        self._arrivals.accept(message, self._now())
+        self._commands.accept(message, self._now())
         self._move()
 
-    def _go_on(self) -> None:
+    def _continue(self) -> None:
         """Move by timer while there is a way to go; a pause or a reset ends it."""
         if self._follow_resets():
             self._ramp.cancel()
@@ -134,24 +127,24 @@ class ControlMixer(Component):
             self._ramp.cancel()
         elif self._ramp.is_canceled():
             self._ramp.reset()
-        self._say_once()
+        self._warn_once()
 
-    def _say_once(self) -> None:
+    def _warn_once(self) -> None:
         """One line when a limit is reached; again only after it has been left for a while."""
         now = time.monotonic()
         for text in self._mixer.saturated:
-            if now - self._last_seen.get(text, -math.inf) > COMPLAINT_PERIOD:
+            if now - self._last_seen.get(text, -math.inf) > WARNING_PERIOD:
                 self.get_logger().warning(f"clipped: {text}")
                 self._publish_health()
             self._last_seen[text] = now
 
     def _publish_health(self) -> None:
         problems = [(DiagnosticStatus.WARN, f"clipped: {text}") for text in self._mixer.saturated]
-        problems += self._arrivals.problems()
+        problems += self._commands.problems()
         if self._loop is None and not self.count_publishers(self._time.topic_name):
-            problems.append((DiagnosticStatus.WARN, f"no simulator: nobody publishes {self._time.topic_name}"))
-        values = {"rate_limited": not self._mixer.arrived, **self._arrivals.values()}
-        message = DiagnosticArray(status=[diagnostic("control_mixer", problems, values)])
+            problems.append((DiagnosticStatus.WARN, f"no simulator: no node publishes {self._time.topic_name}"))
+        values = {"rate_limited": not self._mixer.arrived, **self._commands.values()}
+        message = DiagnosticArray(status=[diagnostic_status("control_mixer", problems, values)])
         message.header.stamp = to_time(self._now())
         self._health.publish(message, self._now())
 

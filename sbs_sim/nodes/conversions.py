@@ -21,32 +21,22 @@ from sbs_msgs.msg import (
     FlightEvent,
     Inflow,
     InflowArray,
-    LinearModel,
-    Mode,
-    NamedMatrix,
     RotorState,
     RotorStateArray,
     SimulationStatus,
     Swashplate,
     SwashplateArray,
-    SweepPoint,
-    TrimCondition,
-    TrimPoint,
     WorkingState,
 )
 from sbs_msgs.msg import Wind as WindMessage
 from sbs_msgs.srv import SetWind
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.description import Rotor
-from sbs_sim.analysis import linearize, modes, sweep, trim
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight import validity
-from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.records import Event, Snapshot
-from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
-from sbs_sim.model.average import azimuths
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.state import harmonic_count
@@ -60,9 +50,9 @@ FRAME_ODOM = "odom"
 FRAME_BASE = "base_link"
 BLADE_FIELDS = ("flap", "flap_rate", "lag", "lag_rate", "blade_flap", "blade_lag")
 HALF = math.sqrt(0.5)
-LARGEST = 1e9  # of any number of a flight that can be shown
+MAX_VALUE = 1e9  # of any number of a flight that can be shown
 DEFAULT_TURBULENCE_LENGTH = 50.0  # m
-LEAST_TURBULENCE_AIRSPEED = 1.0  # m/s
+MIN_TURBULENCE_AIRSPEED = 1.0  # m/s
 
 
 def to_time(seconds: float) -> Time:
@@ -109,7 +99,7 @@ def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
     relative = _ground_velocity(snapshot) - np.array(velocity)
     speed = float(np.hypot(relative[0], relative[1]))
     heading = quaternion_to_euler(snapshot.state[S.ATTITUDE : S.VELOCITY])[0]
-    moving = speed >= LEAST_TURBULENCE_AIRSPEED
+    moving = speed >= MIN_TURBULENCE_AIRSPEED
     return Wind(
         velocity=velocity,
         gust=_triple(request.gust),
@@ -117,7 +107,7 @@ def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
         gust_duration=request.gust_duration,
         turbulence_intensity=_triple(request.turbulence_intensity),
         turbulence_length=request.turbulence_length or DEFAULT_TURBULENCE_LENGTH,
-        turbulence_airspeed=request.turbulence_airspeed or min(max(speed, LEAST_TURBULENCE_AIRSPEED), MAX_WIND),
+        turbulence_airspeed=request.turbulence_airspeed or min(max(speed, MIN_TURBULENCE_AIRSPEED), MAX_WIND),
         turbulence_direction=math.atan2(relative[1], relative[0]) if moving else heading,
         turbulence_seed=request.turbulence_seed,
     )
@@ -128,9 +118,9 @@ def event_message(event: Event, step_size: float) -> FlightEvent:
     message = FlightEvent(step=event.step, kind=event.kind)
     message.header.stamp = to_time(event.step * step_size)
     if event.swashplate is not None:
-        message.swashplate = _doubles(event.swashplate)
+        message.swashplate = float64_array(event.swashplate)
     if event.state is not None:
-        message.state = _doubles(event.state)
+        message.state = float64_array(event.state)
     if event.wind is not None:
         _fill_wind(message.wind, event.wind)
     message.wind_step, message.wind_ticks = event.wind_step, event.wind_ticks
@@ -164,7 +154,7 @@ def _set_vector(target: Vector3 | Point, values: Sequence[float]) -> None:
     target.x, target.y, target.z = values
 
 
-def _doubles(values: Array) -> array.array:
+def float64_array(values: Array) -> array.array:
     """Array for a float64[] field: this type alone is taken without a look at every element."""
     return array.array("d", values.tobytes())
 
@@ -177,12 +167,12 @@ def fill_working_states(status: SimulationStatus, aircraft: Aircraft, snapshot: 
     status.warnings = validity.warnings(aircraft, rows)
     if len(status.working_states) != len(rows):
         status.working_states = [WorkingState() for _ in rows]
-    for rotor, row, told in zip(aircraft.rotors, rows, status.working_states, strict=True):
+    for rotor, row, message in zip(aircraft.rotors, rows, status.working_states, strict=True):
         state = validity.working_state(row)
-        told.advance_ratio, told.descent_ratio = state.advance_ratio, state.descent_ratio
-        told.stalled_share, told.reversed_share = state.stalled_share, state.reversed_share
-        told.outside_share, told.tip_mach = state.outside_share, validity.tip_mach(aircraft, rotor, row)
-        told.inflow_state = validity.INFLOW_STATES.index(state.inflow_state)
+        message.advance_ratio, message.descent_ratio = state.advance_ratio, state.descent_ratio
+        message.stalled_share, message.reversed_share = state.stalled_share, state.reversed_share
+        message.outside_share, message.tip_mach = state.outside_share, validity.tip_mach(aircraft, rotor, row)
+        message.inflow_state = validity.INFLOW_STATES.index(state.inflow_state)
 
 
 class BladeAngles:
@@ -201,7 +191,7 @@ class BladeAngles:
     def of(self, snapshot: Snapshot) -> Array:
         """Flap and lag [rad], shape (2, blades of all rotors): rotor after rotor, valid until the next call."""
         for alike in self._alike:
-            self._angles[:, alike.places] = alike.of(snapshot)
+            self._angles[:, alike.indices] = alike.of(snapshot)
         return self._angles
 
 
@@ -212,7 +202,7 @@ class _BladesAlike:
         layout = aircraft.layout
         firsts = np.cumsum([0, *layout.blades])
         self._rotors = np.array([j for j, blades in enumerate(layout.blades) if blades == count])
-        self.places = np.array([firsts[j] + k for j in self._rotors for k in range(count)])
+        self.indices = np.array([firsts[j] + k for j in self._rotors for k in range(count)])
         coordinates = [(layout.flap(j), layout.lag(j)) for j in self._rotors.tolist()]
         order = np.arange(layout.size)
         self._coordinates = np.array([np.stack([order[flap], order[lag]], axis=-1) for flap, lag in coordinates])
@@ -269,7 +259,7 @@ class StateMessages:
             rotor.azimuth = azimuth[j]
             self._fill_rotor(rotor, j, snapshot.state, loads[j])
             own = slice(self._firsts[j], self._firsts[j + 1])
-            rotor.blade_flap, rotor.blade_lag = _doubles(flaps[own]), _doubles(lags[own])
+            rotor.blade_flap, rotor.blade_lag = float64_array(flaps[own]), float64_array(lags[own])
             inflow = self.inflow.rotors[j]
             inflow.uniform, inflow.sine, inflow.cosine = values[self._layout.inflow(j)]
 
@@ -283,10 +273,10 @@ class StateMessages:
 
     def _fill_rotor(self, rotor: RotorState, j: int, state: Array, loads: list[float]) -> None:
         layout = self._layout
-        rotor.flap = _doubles(state[layout.flap(j)])
-        rotor.flap_rate = _doubles(state[layout.flap_rate(j)])
-        rotor.lag = _doubles(state[layout.lag(j)])
-        rotor.lag_rate = _doubles(state[layout.lag_rate(j)])
+        rotor.flap = float64_array(state[layout.flap(j)])
+        rotor.flap_rate = float64_array(state[layout.flap_rate(j)])
+        rotor.lag = float64_array(state[layout.lag(j)])
+        rotor.lag_rate = float64_array(state[layout.lag_rate(j)])
         rotor.thrust, rotor.torque = loads[R.THRUST], loads[R.TORQUE]
         rotor.power = loads[R.TORQUE] * rotor.speed
         _set_vector(rotor.hub.force, loads[R.FORCE : R.FORCE + 3])
@@ -305,7 +295,7 @@ class StateMessages:
 
 def _rotor_at_rest(rotor: Rotor) -> RotorState:
     """Message of a rotor with a number for every blade."""
-    still = {name: _doubles(np.zeros(rotor.blades)) for name in BLADE_FIELDS}
+    still = {name: float64_array(np.zeros(rotor.blades)) for name in BLADE_FIELDS}
     return RotorState(speed=rotor.speed, **still)
 
 
@@ -364,8 +354,8 @@ def snapshot_of(
     acceleration = np.array(_triple(body.acceleration))
     azimuth = np.array([rotor.azimuth for rotor in rotors.rotors])
     for values in (state, acceleration, azimuth, loads):
-        if not np.all(np.abs(values) < LARGEST):  # false for a NaN as well
-            raise SimulationError(f"the flight has numbers that are not finite or beyond {LARGEST:g}")
+        if not np.all(np.abs(values) < MAX_VALUE):  # false for a NaN as well
+            raise SimulationError(f"the flight has numbers that are not finite or beyond {MAX_VALUE:g}")
     if not state[S.ATTITUDE : S.VELOCITY].any():
         raise SimulationError("the flight has an attitude of 0: allowed is a quaternion")
     return Snapshot(
@@ -382,126 +372,3 @@ def snapshot_of(
 
 def _set_quaternion(target: Quaternion, values: Sequence[float]) -> None:
     target.w, target.x, target.y, target.z = values
-
-
-# ------------------------------------------------------------------------------------------------ trims and models
-
-
-def trim_message(aircraft: Aircraft, point: trim.TrimPoint) -> TrimPoint:
-    """Message of a trim."""
-    rotors = StateMessages(aircraft)
-    rotors.fill(_mean_snapshot(aircraft, point))
-    return TrimPoint(
-        condition=_condition_message(point),
-        controls=controls_of(point.controls),
-        roll=point.roll,
-        pitch=point.pitch,
-        swashplate=swashplate_messages(point.swashplate),
-        rotors=rotors.rotors.rotors,
-        inflow=rotors.inflow.rotors,
-        state_names=point.state_names,
-        state=_doubles(point.state),
-        thrust=float(point.thrust.sum()),
-        power=float(point.power.sum()),
-        residual=point.residual,
-        iterations=point.iterations,
-        inner_iterations=point.inner_iterations,
-        beyond_limits=point.beyond_limits,
-        warnings=point.warnings,
-    )
-
-
-def _condition_message(point: trim.TrimPoint) -> TrimCondition:
-    condition = point.condition
-    return TrimCondition(
-        airspeed=float(condition.airspeed),
-        climb_rate=float(condition.climb_rate),
-        sideslip=float(condition.sideslip),
-        turn_rate=float(condition.turn_rate),
-        lead_lag=point.lead_lag,
-        cyclic_inflow=point.cyclic_inflow,
-        azimuth_count=point.azimuth_count,
-        method=point.method,
-    )
-
-
-def _mean_snapshot(aircraft: Aircraft, point: trim.TrimPoint) -> Snapshot:
-    """Trim as the instant at which the first blades are aft, with the mean loads of a revolution."""
-    count = len(aircraft.rotors)
-    state = trimmed_state(aircraft, point)
-    engine = Engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
-    _, loads = engine.average(state, point.swashplate, azimuths(aircraft.layout.blades, point.azimuth_count))
-    return Snapshot(
-        step=0,
-        time=0.0,
-        state=state,
-        acceleration=np.zeros(3),
-        swashplate=point.swashplate,
-        azimuth=np.zeros(count),
-        loads=loads,
-        wind=np.zeros(3),
-    )
-
-
-def model_message(aircraft: Aircraft, model: linearize.LinearModel) -> LinearModel:
-    """Message of a linear model with its modes."""
-    return LinearModel(
-        state_names=model.state_names,
-        state_units=model.state_units,
-        control_names=model.control_names,
-        control_units=model.control_units,
-        a=_doubles(model.a),
-        b=_doubles(model.b),
-        output_names=model.output_names,
-        output_units=model.output_units,
-        c=_doubles(model.c),
-        d=_doubles(model.d),
-        trim=trim_message(aircraft, model.trim),
-        modes=[_mode_message(mode) for mode in model.modes],
-        azimuth_spread=model.azimuth_spread,
-        steps=_doubles(model.steps),
-        method=model.method,
-        parameter_hash=model.parameter_hash,
-        blocks=[_matrix_message(name, matrix) for name, matrix in model.blocks.items()],
-        warnings=model.warnings,
-    )
-
-
-def _mode_message(mode: modes.Mode) -> Mode:
-    return Mode(
-        name=mode.name,
-        real=mode.pole.real,
-        imag=mode.pole.imag,
-        frequency=mode.frequency,
-        damping=mode.damping,
-        time_to_half=mode.time_to_half,
-        time_to_double=mode.time_to_double,
-        participation=_doubles(mode.participation),
-    )
-
-
-def _matrix_message(name: str, matrix: Array) -> NamedMatrix:
-    rows, columns = matrix.shape
-    return NamedMatrix(name=name, rows=rows, columns=columns, data=_doubles(matrix))
-
-
-def sweep_messages(aircraft: Aircraft, swept: sweep.Sweep) -> list[SweepPoint]:
-    """Messages of all points of a sweep, with or without a result."""
-    return [_sweep_point_message(_aircraft_at(aircraft, swept.parameter, point), point) for point in swept.points]
-
-
-def _aircraft_at(aircraft: Aircraft, parameter: str, point: sweep.SweepPoint) -> Aircraft:
-    """Aircraft of a point: another one where a value of its file is swept."""
-    if parameter in sweep.CONDITIONS or point.trim is None:
-        return aircraft
-    return aircraft.with_value(parameter, point.value)
-
-
-def _sweep_point_message(aircraft: Aircraft, point: sweep.SweepPoint) -> SweepPoint:
-    message = SweepPoint(value=point.value, success=point.error is None, message=point.error or "")
-    message.warnings = point.warnings
-    if point.trim is not None:
-        message.trim = trim_message(aircraft, point.trim)
-    if point.model is not None:
-        message.model = model_message(aircraft, point.model)
-    return message

@@ -12,16 +12,16 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 PILOTS = ("hover_hold", "teleop", "joystick")
 NODES = {
     "simulator": ("simulator",),
-    "outputs": ("simulator",),
+    "simulator_outputs": ("simulator",),
     "control_mixer": ("control_mixer",),
     "analysis": ("analysis",),
-    "recording": ("recorder",),
-    "pilot": PILOTS,
+    "recorder_node": ("recorder",),
+    "pilot_node": PILOTS,
     "hover_hold": ("hover_hold",),
     "joystick": ("joystick",),
 }
 ROLES = {
-    "Topic": "publisher",
+    "RecordedPublisher": "publisher",
     "create_publisher": "publisher",
     "create_subscription": "subscription",
     "create_service": "service",

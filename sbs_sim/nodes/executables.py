@@ -5,14 +5,12 @@ They import next to nothing, so that Ctrl-C is obeyed at once while the compiled
 
 import importlib
 import os
-import signal
 import sys
-from collections.abc import Callable
 
-from sbs_sim.nodes.output import wait_for_no_reader
+from sbs_sim.nodes.signals import INTERRUPTED, when_interrupted
+from sbs_sim.nodes.standard_streams import make_standard_streams_non_blocking
 from sbs_sim.terminal import command_line
 
-INTERRUPTED = 128 + signal.SIGINT  # exit code of what was not meant to run until Ctrl-C
 OWN_COMMAND_LINE = ("replay", "cockpit")
 ROS = ("rclpy", "_msgs", "_srvs", "_interfaces", "ament_index_python")
 # The matrices are small: threads of numpy and scipy would gain nothing, and take the cores that the flight needs.
@@ -70,7 +68,7 @@ def _run(name: str, interrupted: int = 0) -> None:
         if {"-h", "--help"} & set(own):
             print(importlib.import_module("sbs_sim.nodes.usage").text(name), end="")
             return
-        wait_for_no_reader()  # before anything takes hold of the standard output
+        make_standard_streams_non_blocking()  # before anything takes hold of the standard output
         module = importlib.import_module(f"sbs_sim.nodes.{name}")
     except ModuleNotFoundError as error:
         if not (error.name or "").partition(".")[0].endswith(ROS):
@@ -85,19 +83,6 @@ def _run(name: str, interrupted: int = 0) -> None:
     module.main()
 
 
-def when_interrupted(act: Callable[..., object]) -> None:
-    """What to do when somebody wants the end: by Ctrl-C, by `kill`, or by closing the terminal, if that is heeded."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        if (number, signal.getsignal(number)) != (signal.SIGHUP, signal.SIG_IGN):  # nohup
-            signal.signal(number, act)
-
-
-def ignore_interruptions() -> None:
-    """Do not let anything disturb the end."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
-
-
 def _end_at_once_when_interrupted(code: int = 0) -> None:
-    """Until the nodes run there is nothing to be ended in good order: `sbs_sim.nodes.host.run` takes over then."""
+    """Until the nodes run there is nothing to be ended in good order: `sbs_sim.nodes.process.run` takes over then."""
     when_interrupted(lambda *_: os._exit(code))

@@ -1,4 +1,4 @@
-"""Node `hover_hold`: keeps place and heading; the worked example of what `linearize` is good for (docs/tutorial.md).
+"""Node `hover_hold`: keeps position and heading; the worked example of what `linearize` is good for (docs/tutorial.md).
 
 Calls `linearize`, designs the gains and prints them; from then on every `state` is answered by `controls`. Subscribes
 `target` (where to go; at first it stays where it is), `events` for resets and `status` for pauses; publishes
@@ -19,19 +19,25 @@ from sbs_msgs.srv import Linearize
 from sbs_sim.errors import PilotError, SbsError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
-from sbs_sim.nodes.host import COMMAND_QOS, COMPLAINT_PERIOD, SERVICE_QOS, Parameter, Refusals, declare, run
-from sbs_sim.nodes.pilot import WAITING_PERIOD, PilotNode
+from sbs_sim.nodes.parameters import Parameter, declare
 from sbs_sim.nodes.pilot_conversions import hover_model, to_target
+from sbs_sim.nodes.pilot_node import WAITING_PERIOD, PilotNode
+from sbs_sim.nodes.process import run
+from sbs_sim.nodes.qos import COMMAND_QOS, SERVICE_QOS
+from sbs_sim.nodes.rejections import WARNING_PERIOD, Rejections
 from sbs_sim.pilot.hover_hold import LIMITS, HoverHold, design
 
 PARAMETERS = {
     "largest_distance": Parameter(100.0, "Targets farther from the aircraft than this are refused [m]", 0.1, 1e5),
     "patience": Parameter(60.0, "How long to wait for the service linearize [s]", 1.0, 3600.0),
     "position_limit": Parameter(
-        LIMITS["forward"], "Departure of place that costs like the others at theirs [m]: less is tighter", 0.05, 10.0
+        LIMITS["forward"],
+        "Position error that costs as much as the other errors at their limits [m]; less is tighter",
+        0.05,
+        10.0,
     ),
 }
-ASKING = 0.2  # s between two looks whether the service is there
+POLL_PERIOD = 0.2  # s between two looks whether the service is there
 
 
 class HoverHoldNode(PilotNode):
@@ -45,7 +51,7 @@ class HoverHoldNode(PilotNode):
         found = design(model, dict.fromkeys(("forward", "right", "down"), parameters["position_limit"]))
         print("\n".join(found.describe()), flush=True)
         self._pilot = HoverHold(found)
-        self._refusals = Refusals(self, "target")
+        self._rejections = Rejections(self, "target")
         self.create_subscription(PoseStamped, "target", self._on_target, COMMAND_QOS)
         self.begin()
 
@@ -53,21 +59,21 @@ class HoverHoldNode(PilotNode):
         """Linear model of hover, from the service."""
         client = self.create_client(Linearize, "linearize", qos_profile=SERVICE_QOS)
         self.get_logger().info("asking linearize for the model of hover")
-        told = time.monotonic()
-        end = told + patience
-        while not client.wait_for_service(ASKING):
+        last_message = time.monotonic()
+        end = last_message + patience
+        while not client.wait_for_service(POLL_PERIOD):
             now = time.monotonic()
             if now > end:
                 raise PilotError(f"no service linearize within {patience:g} s: is a simulator running?")
-            if now - told > WAITING_PERIOD:
-                told = now
+            if now - last_message > WAITING_PERIOD:
+                last_message = now
                 flies = self.count_publishers("state") > 0
                 whose = "a simulator flies, but no node analysis" if flies else "is a simulator running there?"
                 self.get_logger().info(f"waiting for {self.topic('linearize')}: {whose}")
         answer = client.call_async(Linearize.Request())
         while not answer.done():
             left = end - time.monotonic()
-            rclpy.spin_until_future_complete(self, answer, timeout_sec=max(ASKING, min(left, WAITING_PERIOD)))
+            rclpy.spin_until_future_complete(self, answer, timeout_sec=max(POLL_PERIOD, min(left, WAITING_PERIOD)))
             if not answer.done() and left <= 0.0:
                 raise PilotError(f"no answer of linearize within {patience:g} s")
             if not answer.done():
@@ -77,38 +83,38 @@ class HoverHoldNode(PilotNode):
             raise PilotError(f"linearize: {answer.result().message}")
         return answer.result().model
 
-    def fly(self, now: float, body: NDArray[np.float64]) -> NDArray[np.float64]:
+    def controls_for(self, now: float, body: NDArray[np.float64]) -> NDArray[np.float64]:
         """Answer a state with controls."""
         if self.body is None or now < self.time:
-            self.get_logger().info("holding the place where the aircraft is")
+            self.get_logger().info("holding the present position")
         return self._pilot.controls(now, body)
 
     def _on_target(self, message: PoseStamped) -> None:
         try:
-            place, heading = to_target(message)
+            position, heading = to_target(message)
             if self.body is None:
                 raise PilotError("no state has come yet")
-            distance = float(np.linalg.norm(place - self.body[: S.ATTITUDE]))
+            distance = float(np.linalg.norm(position - self.body[: S.ATTITUDE]))
             if distance > self._largest_distance:
                 raise PilotError(f"distance = {distance:g} m: allowed are 0 to {self._largest_distance:g} m")
-            self._pilot.hold(place, heading)
+            self._pilot.hold(position, heading)
         except SbsError as error:
-            self._refusals.add(error)
+            self._rejections.add(error)
             return
-        north, east, down = place
+        north, east, down = position
         text = f"north {north:.2f}, east {east:.2f}, height {-down:.2f} m, heading {math.degrees(heading):.1f} deg"
-        self.get_logger().info(f"target: {text}", throttle_duration_sec=COMPLAINT_PERIOD)
+        self.get_logger().info(f"target: {text}", throttle_duration_sec=WARNING_PERIOD)
 
     def on_event(self, event: FlightEvent, is_new: bool) -> None:
-        """After a reset the place is another, and what was wanted before is void."""
+        """Hold the new position after a reset; the target before it is void."""
         if is_new and event.kind == FlightEvent.RESET:
             state = np.array(event.state)
             self._pilot.restart((state[: S.ATTITUDE], quaternion_to_euler(state[S.ATTITUDE : S.VELOCITY])[0]))
-            self.get_logger().info("reset: holding the place where the aircraft is put")
+            self.get_logger().info("reset: holding the new position")
 
     def values(self) -> dict[str, object]:
-        """Refused targets."""
-        return self._refusals.values()
+        """Rejected targets."""
+        return self._rejections.values()
 
 
 def main(args: list[str] | None = None) -> None:

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import Joy
 
 from sbs_sim.errors import SbsError
-from sbs_sim.nodes.host import STATE_QOS, Parameter, Refusals, run
+from sbs_sim.nodes.parameters import Parameter
+from sbs_sim.nodes.process import run
+from sbs_sim.nodes.qos import STATE_QOS
+from sbs_sim.nodes.rejections import Rejections
 from sbs_sim.nodes.stick_node import STICK_PARAMETERS, StickNode
 from sbs_sim.pilot.joystick import Joystick, JoystickFile
 
@@ -33,7 +36,7 @@ class JoystickNode(StickNode):
         self._position = np.zeros(len(self._file.deflections))
         self._heard: float | None = None  # wall time of the latest message [s]
         self._silent = False
-        self._refusals = Refusals(self, "joy")
+        self._rejections = Rejections(self, "joy")
         self.create_subscription(Joy, "joy", self._on_joy, STATE_QOS)
         self.begin()
 
@@ -41,7 +44,7 @@ class JoystickNode(StickNode):
         try:
             reading = self._joystick.read(message.axes, message.buttons)
         except SbsError as error:
-            self._refusals.add(error)
+            self._rejections.add(error)
             return
         if self._silent or self._heard is None:
             self.get_logger().info("joystick heard")
@@ -75,8 +78,8 @@ class JoystickNode(StickNode):
         return ["no message on joy"] if self._silent or self._heard is None else []
 
     def values(self) -> dict[str, object]:
-        """Refused messages too."""
-        return {**super().values(), **self._refusals.values()}
+        """Rejected messages too."""
+        return {**super().values(), **self._rejections.values()}
 
 
 def main(args: list[str] | None = None) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from sbs_sim.errors import SbsError, SimulationError
 
-LEAST = sys.float_info.min  # in size: below, a float64 has lost digits already, and no unit makes that of use
+MIN_NORMAL = sys.float_info.min  # in size: below, a float64 has lost digits already, and no unit makes that of use
 CAUSE = "an integer in a float field? 5.0 is meant where 5 stands, ROS_PYTHON_CHECK_FIELDS=1 finds it"
 
 
@@ -28,8 +28,8 @@ def check_numbers(message: Any, decaying: Collection[str] = (), error: type[SbsE
         Of the error.
     """
     for name, value in scalars(message):
-        if 0.0 < abs(value) < LEAST and name not in decaying:
-            raise error(f"{name} = {value}: allowed are 0 and what is at least {LEAST:.3g} in size; {CAUSE}")
+        if 0.0 < abs(value) < MIN_NORMAL and name not in decaying:
+            raise error(f"{name} = {value}: allowed are 0 and what is at least {MIN_NORMAL:.3g} in size; {CAUSE}")
 
 
 def hint(message: Any) -> str:

@@ -27,7 +27,7 @@ from sbs_sim.pilot.hover_hold import HoverModel, checked_body
 
 Array = NDArray[np.float64]
 
-LARGEST_TILT = math.radians(10.0)  # of a target, of which only the heading can be held
+MAX_TILT = math.radians(10.0)  # of a target, of which only the heading can be held
 
 
 def controls_message(controls: Array, stamp: Time) -> Controls:
@@ -78,8 +78,8 @@ def to_target(message: PoseStamped) -> tuple[Array, float]:
     if frame not in (FRAME_NED, FRAME_ODOM):
         raise PilotError(f"frame_id = {frame!r}: allowed are {FRAME_NED!r}, {FRAME_ODOM!r}")
     check_numbers(message.pose, error=PilotError)
-    place, turn = message.pose.position, message.pose.orientation
-    for name, part in (("position", place), ("orientation", turn)):
+    point, turn = message.pose.position, message.pose.orientation
+    for name, part in (("position", point), ("orientation", turn)):
         for axis in part.get_fields_and_field_types():
             if not math.isfinite(getattr(part, axis)):
                 raise PilotError(f"{name}.{axis} = {getattr(part, axis)}: allowed are finite numbers")
@@ -87,13 +87,13 @@ def to_target(message: PoseStamped) -> tuple[Array, float]:
     norm = math.hypot(*quaternion)
     if not 0.99 <= norm <= 1.01:
         raise PilotError(f"orientation has a norm of {norm:g}: allowed is a unit quaternion")
-    position = point_array(place)
+    position = point_array(point)
     if frame == FRAME_ODOM:
-        position = np.array([place.y, place.x, -place.z])
+        position = np.array([point.y, point.x, -point.z])
         quaternion = enu_flu_quaternion(quaternion)  # the way there is the way back
     unit = np.array(quaternion) / norm
     tilt = math.acos(min(1.0, rotation_matrix(unit)[2, 2]))
-    if tilt > LARGEST_TILT:
-        allowed = f"allowed are 0 to {math.degrees(LARGEST_TILT):g} deg, of an upright aircraft"
+    if tilt > MAX_TILT:
+        allowed = f"allowed are 0 to {math.degrees(MAX_TILT):g} deg, of an upright aircraft"
         raise PilotError(f"orientation is tilted by {math.degrees(tilt):.1f} deg: {allowed}")
     return position, quaternion_to_euler(unit)[0]

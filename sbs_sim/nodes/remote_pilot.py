@@ -14,17 +14,17 @@ from std_srvs.srv import SetBool
 
 from sbs_msgs.msg import Controls, TrimPoint
 from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim
-from sbs_sim.cockpit.told import Trimmed
+from sbs_sim.cockpit.trim_report import TrimResult
 from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.nodes.conversions import controls_of
-from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS
+from sbs_sim.nodes.qos import COMMAND_QOS, SERVICE_QOS
 
 Array = NDArray[np.float64]
 Answer = tuple[bool, str]
 
-PATIENCE = 10.0  # s for an answer
-ANALYSIS_PATIENCE = 60.0  # s for a trim or a linear model
+SERVICE_TIMEOUT = 10.0  # s for an answer
+ANALYSIS_TIMEOUT = 60.0  # s for a trim or a linear model
 COMMAND_PERIOD = 0.1  # s between commands that hold the controls
 SETTINGS = {"aircraft": str, "ground_altitude": float, "real_time_factor": float}
 SERVICES = {
@@ -53,7 +53,7 @@ class _Doublet:
 
 
 class RemotePilot:
-    """See `sbs_sim.cockpit.panels.Pilot`. The calls wait for their answers: they do not belong into callbacks of ROS.
+    """See `sbs_sim.cockpit.fly_panel.Pilot`. The calls wait for their answers; do not use them in ROS callbacks.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class RemotePilot:
         self._doublet: _Doublet | None = None
         node.create_timer(COMMAND_PERIOD, self._hold)
 
-    def _call(self, name: str, request: Any, patience: float = PATIENCE) -> Any:
+    def _call(self, name: str, request: Any, patience: float = SERVICE_TIMEOUT) -> Any:
         """Response of a service; None if there is none in time."""
         client = self._clients[name]
         if not client.service_is_ready():
@@ -83,7 +83,7 @@ class RemotePilot:
             return None
         return future.result()
 
-    def _ask(self, name: str, request: Any, patience: float = PATIENCE) -> Answer:
+    def _ask(self, name: str, request: Any, patience: float = SERVICE_TIMEOUT) -> Answer:
         response = self._call(name, request, patience)
         return (False, f"no answer of {name}") if response is None else (response.success, response.message)
 
@@ -147,7 +147,7 @@ class RemotePilot:
         """Put the aircraft into a trimmed condition at a height above the origin [m]."""
         request = Reset.Request(**_condition(condition))
         request.position.z = -float(height)
-        return self._ask("reset", request, ANALYSIS_PATIENCE)
+        return self._ask("reset", request, ANALYSIS_TIMEOUT)
 
     def set_pace(self, factor: float) -> Answer:
         """Simulation time over wall time; 0 is as fast as possible."""
@@ -169,20 +169,20 @@ class RemotePilot:
         """Begin a log in the default folder, or end the present one."""
         return self._ask("record", Record.Request(record=on))
 
-    def trim(self, condition: TrimCondition) -> tuple[Trimmed | None, str]:
+    def trim(self, condition: TrimCondition) -> tuple[TrimResult | None, str]:
         """Trim a condition."""
-        response = self._call("trim", Trim.Request(**_condition(condition)), ANALYSIS_PATIENCE)
+        response = self._call("trim", Trim.Request(**_condition(condition)), ANALYSIS_TIMEOUT)
         return _trimmed(condition, response, "trim", lambda: response.trim)
 
-    def linearize(self, condition: TrimCondition) -> tuple[Trimmed | None, str]:
+    def linearize(self, condition: TrimCondition) -> tuple[TrimResult | None, str]:
         """Linearize about a condition: its trim; the model comes by `linear_model`."""
-        response = self._call("linearize", Linearize.Request(**_condition(condition)), ANALYSIS_PATIENCE)
+        response = self._call("linearize", Linearize.Request(**_condition(condition)), ANALYSIS_TIMEOUT)
         return _trimmed(condition, response, "linearize", lambda: response.model.trim)
 
 
 def _trimmed(
     condition: TrimCondition, response: Any, name: str, point_of: Callable[[], TrimPoint]
-) -> tuple[Trimmed | None, str]:
+) -> tuple[TrimResult | None, str]:
     """Trim of an answer, or why there is none."""
     if response is None:
         return None, f"no answer of {name}: is there an analysis node?"
@@ -191,7 +191,7 @@ def _trimmed(
     point = point_of()
     controls = np.array([getattr(point.controls, name) for name in CONTROL_NAMES])
     notes = (*point.beyond_limits, *(f"outside the model's validity: {text}" for text in response.warnings))
-    return Trimmed(condition, controls, point.pitch, point.roll, point.thrust, point.power, notes), ""
+    return TrimResult(condition, controls, point.pitch, point.roll, point.thrust, point.power, notes), ""
 
 
 def _condition(condition: TrimCondition) -> dict[str, float]:

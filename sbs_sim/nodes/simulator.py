@@ -23,16 +23,20 @@ from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
-from sbs_sim.nodes.arrivals import Arrivals
+from sbs_sim.nodes.command_monitor import CommandMonitor
+from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
-from sbs_sim.nodes.host import COMMAND_QOS, SERVICE_QOS, Component, Parameter, declare, heed, run
-from sbs_sim.nodes.outputs import Outputs
-from sbs_sim.nodes.recording import Recording
+from sbs_sim.nodes.parameters import Parameter, declare
+from sbs_sim.nodes.process import run
+from sbs_sim.nodes.qos import COMMAND_QOS, SERVICE_QOS
+from sbs_sim.nodes.recorder_node import RecorderNode
+from sbs_sim.nodes.signals import note_interruptions
+from sbs_sim.nodes.simulator_outputs import SimulatorOutputs
 
 OFF = "off"
 # How long a thread keeps the interpreter while the flight waits for it [s]; the 5 ms of Python are half a tick.
-TURN = 0.5e-3
+SWITCH_INTERVAL = 0.5e-3
 COMPONENTS = ("simulator", "control_mixer", "analysis", "recorder")
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
@@ -81,9 +85,9 @@ class Simulator(Component):
         self._fidelity = {"lead_lag": values["lead_lag"], "cyclic_inflow": values["cyclic_inflow"]}
         simulation = self._start(values)
         self.loop = FlightLoop(simulation, values["real_time_factor"], values["command_timeout"])
-        self.log = Recording(simulation, self.loop, values) if "recorder" in self.components else None
-        self._arrivals = Arrivals(self, SwashplateArray, "swashplate", COMMAND_QOS, self.log)
-        self._outputs = Outputs(self, self.loop, self._arrivals, self.log)
+        self.log = RecorderNode(simulation, self.loop, values) if "recorder" in self.components else None
+        self._commands = CommandMonitor(self, SwashplateArray, "swashplate", COMMAND_QOS, self.log)
+        self._outputs = SimulatorOutputs(self, self.loop, self._commands, self.log)
         self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
         self.create_service(SetBool, "pause", self._on_pause, qos_profile=SERVICE_QOS)
         self.create_service(Step, "step", self._on_step, qos_profile=SERVICE_QOS)
@@ -97,7 +101,7 @@ class Simulator(Component):
         Raises
         ------
         RecordingError
-            See `Recording.begin`.
+            See `RecorderNode.begin`.
         """
         if self.log is not None and self._values["record"] != OFF:
             self.log.begin(self._values["record"])
@@ -139,12 +143,12 @@ class Simulator(Component):
 
     def _on_swashplate(self, message: SwashplateArray) -> None:
         try:
-            self._arrivals.check(message)
+            self._commands.check(message)
             self.loop.command(swashplate_array(message))
         except SbsError as error:
-            self._arrivals.add(error)
+            self._commands.add(error)
             return
-        self._arrivals.accept(message, self.loop.time)
+        self._commands.accept(message, self.loop.time)
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         done = "paused" if request.data else "playing"
@@ -189,7 +193,7 @@ class Simulator(Component):
         return SetParametersResult(successful=True)
 
     def stop(self) -> None:
-        """End the flight; whoever waits for it is told so."""
+        """End the flight; waiting callers get an error."""
         self.loop.stop()
 
     def finish(self) -> None:
@@ -230,7 +234,7 @@ def checked_components(names: list[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _nodes(asked: list[int]) -> list[Component]:
+def _nodes(interruptions: list[int]) -> list[Component]:
     simulator = Simulator()
     nodes: list[Component] = [simulator]
     if "control_mixer" in simulator.components:
@@ -242,13 +246,13 @@ def _nodes(asked: list[int]) -> list[Component]:
         nodes.append(Analysis(simulator.loop, simulator.log))
     if simulator.log is not None:
         nodes.append(simulator.log)
-    sys.setswitchinterval(TURN)
-    heed(asked)  # a log that has begun is ended
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    note_interruptions(interruptions)  # from now on a log is closed in order
     simulator.begin()  # last: what is loaded meanwhile would make it miss deadlines
     return nodes
 
 
 def main(args: list[str] | None = None) -> None:
     """Fly until interrupted."""
-    asked: list[int] = []
-    sys.exit(run(lambda: _nodes(asked), args, first="simulator", asked=asked))
+    interruptions: list[int] = []
+    sys.exit(run(lambda: _nodes(interruptions), args, first="simulator", interruptions=interruptions))

@@ -1,6 +1,6 @@
 """What is published of every instant, as bytes: numbers go from a snapshot into `templates`, with a few numpy calls.
 
-`SerialisedStates` does the same with ROS's messages, many times slower, where a ROS lays them out as nobody knows.
+`SerialisedStates` does the same with ROS's messages, many times slower, where the layout of a ROS release is unknown.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 STAMP = {"header.stamp.sec": INT, "header.stamp.nanosec": UINT}
 TOPICS = ("state", "rotors", "inflow", "odom")
-MOST_STATUS = 64  # templates of a status that are kept, one for each of its texts
+MAX_STATUS_TEMPLATES = 64  # templates of a status that are kept, one for each of its texts
 QUATERNION, XYZ = "wxyz", "xyz"
 LOADS = {"thrust": R.THRUST, "torque": R.TORQUE}
 LOADS |= {f"hub.force.{axis}": R.FORCE + i for i, axis in enumerate(XYZ)}
@@ -62,7 +62,7 @@ class SerialisedStates:
 class StateBytes:
     """By templates: the same bytes, but for those in gaps, which ROS leaves to chance.
 
-    All numbers of an instant are put one behind the other in `_source`; from there each goes to its place.
+    The numbers of an instant are put into `_source`, and copied from there to their indices in a template.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class StateBytes:
         """See `States`."""
         return self._templates[topic].data()
 
-    # ----------------------------------------- fields of the messages, with their places in the source and their signs
+    # ----------------------------------------- fields of the messages, with their indices in the source and their signs
 
     def _at(self, part: str, index: int = 0) -> int:
         return int(self._parts[part].start) + index
@@ -149,8 +149,8 @@ class StateBytes:
 
     def _odom_fields(self, _: Aircraft) -> Iterator[tuple[str, tuple[int, float]]]:
         """NED to ENU, FRD to FLU, as `StateMessages` has it."""
-        for axis, place, sign in (("x", 1, 1.0), ("y", 0, 1.0), ("z", 2, -1.0)):
-            yield f"pose.pose.position.{axis}", (place, sign)
+        for axis, index, sign in (("x", 1, 1.0), ("y", 0, 1.0), ("z", 2, -1.0)):
+            yield f"pose.pose.position.{axis}", (index, sign)
         yield from self._vector("pose.pose.orientation", self._at("quaternion"), QUATERNION)
         for i, (axis, sign) in enumerate((("x", 1.0), ("y", -1.0), ("z", -1.0))):
             yield f"twist.twist.linear.{axis}", (S.VELOCITY + i, sign)
@@ -158,39 +158,39 @@ class StateBytes:
 
 
 class _Write:
-    """Numbers of a source to their places in a template, and the stamp.
+    """Numbers of a source to their indices in a template, and the stamp.
 
     Parameters
     ----------
     template : Template
     fields : dict of str to (int, float)
-        Of every field its place in the source and its sign.
+        Of every field its index in the source and its sign.
     """
 
     def __init__(self, template: Template, fields: dict[str, tuple[int, float]]) -> None:
-        places = template.places(list(fields))
-        order = np.argsort(places)
-        self._places = places[order]
-        self._from = np.array([place for place, _ in fields.values()], dtype=np.int64)[order]
+        indices = template.indices(list(fields))
+        order = np.argsort(indices)
+        self._indices = indices[order]
+        self._from = np.array([index for index, _ in fields.values()], dtype=np.int64)[order]
         signs = np.array([sign for _, sign in fields.values()])[order]
         self._signs = None if (signs == 1.0).all() else signs
         self._numbers, self._seconds, self._rest = (template.view(kind) for kind in (DOUBLE, INT, UINT))
-        self._second, self._nanosecond = (int(template.places([name])[0]) for name in STAMP)
+        self._second, self._nanosecond = (int(template.indices([name])[0]) for name in STAMP)
 
     def __call__(self, source: Array, stamp: Any) -> None:
         values = source[self._from]
         if self._signs is not None:
             values *= self._signs
-        self._numbers[self._places] = values
+        self._numbers[self._indices] = values
         self._seconds[self._second], self._rest[self._nanosecond] = stamp.sec, stamp.nanosec
 
 
-def states_of(aircraft: Aircraft, tell: Callable[[str], Any]) -> States:
-    """Bytes by templates; by ROS's messages, which is told, where these are laid out otherwise."""
+def states_of(aircraft: Aircraft, warn: Callable[[str], Any]) -> States:
+    """Bytes by templates; by ROS's messages, with a warning, where the layout differs."""
     try:
         return StateBytes(aircraft)
     except LayoutError as error:
-        tell(f"messages are serialised one by one, which is slow: {error}")
+        warn(f"messages are serialised one by one, which is slow: {error}")
         return SerialisedStates(aircraft)
 
 
@@ -204,12 +204,12 @@ class StatusBytes:
 
     Parameters
     ----------
-    tell : callable
+    warn : callable
         Takes the line that says why templates cannot be used, if so.
     """
 
-    def __init__(self, tell: Callable[[str], Any]) -> None:
-        self._tell = tell
+    def __init__(self, warn: Callable[[str], Any]) -> None:
+        self._warn = warn
         self._known: dict[Any, _StatusTemplate] = {}
         self._refused = False
 
@@ -223,10 +223,10 @@ class StatusBytes:
             try:
                 template = _StatusTemplate(status)
             except LayoutError as error:
-                self._tell(f"messages are serialised one by one, which is slow: {error}")
+                self._warn(f"messages are serialised one by one, which is slow: {error}")
                 self._refused = True
                 return bytes(serialize_message(status))
-            if len(self._known) >= MOST_STATUS:
+            if len(self._known) >= MAX_STATUS_TEMPLATES:
                 self._known.clear()
             self._known[texts] = template
         return template.data(status)
@@ -241,8 +241,8 @@ class _StatusTemplate:
         letters = ["state", *(f"working_states[{j}].inflow_state" for j in rotors)]
         fields = {**STAMP, **dict.fromkeys(doubles, DOUBLE), **dict.fromkeys(COUNTS, COUNT)}
         self._template = template = Template(status, {**fields, **dict.fromkeys(letters, BYTE)})
-        self._doubles, self._counts = template.places(doubles), template.places(COUNTS)
-        self._letters, self._stamp = template.places(letters), template.places(list(STAMP))
+        self._doubles, self._counts = template.indices(doubles), template.indices(COUNTS)
+        self._letters, self._stamp = template.indices(letters), template.indices(list(STAMP))
 
     def data(self, status: SimulationStatus) -> bytes:
         template, states, stamp = self._template, status.working_states, status.header.stamp

@@ -11,8 +11,8 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.linearize import linearize
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
-from sbs_sim.nodes.host import Parameter, declare
-from sbs_sim.nodes.pilot import PilotNode
+from sbs_sim.nodes.parameters import Parameter, declare
+from sbs_sim.nodes.pilot_node import PilotNode
 from sbs_sim.pilot.augmentation import StickPilot, augmentation
 
 Array = NDArray[np.float64]
@@ -21,11 +21,11 @@ STICK_PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
     "augmentation": Parameter(True, "Stability augmentation is on at the start"),
 }
-SETTLING = 0.3  # s of wall time in which the events of the flight so far arrive
+SETTLING_TIME = 0.3  # s of wall time in which the events of the flight so far arrive
 
 
 class StickNode(PilotNode):
-    """A pilot with sticks, who takes over the controls where they stand.
+    """A pilot with sticks, who takes over the present controls.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class StickNode(PilotNode):
         self.settings: dict[str, Any] = declare(self, parameters)
         self._aircraft = Aircraft.load(self.settings["aircraft"])
         self._found = augmentation(linearize(self._aircraft))
-        self._stand: Array | None = None  # pilot controls of the latest event
+        self._current_controls: Array | None = None  # pilot controls of the latest event
         self._first_event = 0.0
         self._other_rotors = 0  # of the aircraft that flies, if it is not the one that this node knows
         self._first: tuple[Array, float, float] | None = None  # trim at the take-over
@@ -52,12 +52,12 @@ class StickNode(PilotNode):
         """Sticks now, shape (4,), -1 to 1."""
         raise NotImplementedError
 
-    def fly(self, now: float, body: Array) -> Array | None:
-        """Sticks and augmentation; nothing until it is known where the controls stand."""
+    def controls_for(self, now: float, body: Array) -> Array | None:
+        """Sticks and augmentation; nothing until the present controls are known."""
         if self._first is None:
-            if self._stand is None or time.monotonic() - self._first_event < SETTLING:
+            if self._current_controls is None or time.monotonic() - self._first_event < SETTLING_TIME:
                 return None
-            self._take_over(self._stand, body)
+            self._take_over(self._current_controls, body)
         if now < self.time:
             self._first, self._first_event = None, time.monotonic()  # another flight, whose start tells the controls
             return None
@@ -71,19 +71,24 @@ class StickNode(PilotNode):
         self.get_logger().info(f"flying, augmentation {self.switch}")
 
     def on_event(self, event: FlightEvent, is_new: bool) -> None:
-        """Learn where the controls stand; after a reset they are another flight's."""
+        """Update the present controls; after a reset they belong to another flight."""
         angles = np.array(event.swashplate)
         rotors = len(angles) // len(S.SWASHPLATE_NAMES)
         self._other_rotors = rotors if rotors != len(self._aircraft.rotors) else 0
         if len(angles) != len(S.SWASHPLATE_NAMES) * len(self._aircraft.rotors):
             return
-        if self._stand is None:
+        if self._current_controls is None:
             self._first_event = time.monotonic()
         if self._first is None or event.kind in (FlightEvent.START, FlightEvent.RESET):
-            self._stand = self._aircraft.unmix(angles)
-        if self._first is not None and is_new and event.kind == FlightEvent.RESET and self._stand is not None:
+            self._current_controls = self._aircraft.unmix(angles)
+        if (
+            self._first is not None
+            and is_new
+            and event.kind == FlightEvent.RESET
+            and self._current_controls is not None
+        ):
             self.released()
-            self._take_over(self._stand, np.array(event.state))
+            self._take_over(self._current_controls, np.array(event.state))
 
     def waiting_for(self) -> str:
         """What is missing before the controls can be taken over."""
@@ -91,8 +96,8 @@ class StickNode(PilotNode):
             own = f"{self._aircraft.name} has {len(self._aircraft.rotors)}"
             return f"another flight: the aircraft of this one has {self._other_rotors} rotors, {own}; see aircraft:="
         what = super().waiting_for()
-        if not what and self._first is None and self._stand is None:
-            return f"{self.topic('events')}, which tells where the controls stand"
+        if not what and self._first is None and self._current_controls is None:
+            return f"{self.topic('events')}, which has the present controls"
         return what
 
     def released(self) -> None:

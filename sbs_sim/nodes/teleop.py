@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from sbs_sim.errors import PilotError
 from sbs_sim.model import state as S
-from sbs_sim.nodes.host import STOP_PERIOD, Parameter, run
+from sbs_sim.nodes.parameters import Parameter
+from sbs_sim.nodes.process import SHUTDOWN_POLL_PERIOD, run
 from sbs_sim.nodes.stick_node import STICK_PARAMETERS, StickNode
 from sbs_sim.pilot.sticks import KeySticks, keys_of, shaped
 
@@ -83,9 +84,9 @@ class Teleop(StickNode):
             self._press(key)
         return np.array([shaped(value, 0.0, self.settings["expo"]) for value in self._keys.position])
 
-    def fly(self, now: float, body: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def controls_for(self, now: float, body: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Fly, and show how."""
-        controls = super().fly(now, body)
+        controls = super().controls_for(now, body)
         if controls is not None and time.monotonic() - self._shown > LINE_PERIOD:
             self._shown = time.monotonic()
             angles = " ".join(f"{math.degrees(value):6.2f}" for value in controls)
@@ -108,7 +109,7 @@ class Teleop(StickNode):
         """Read keys until the end."""
         number = sys.stdin.fileno()
         while not self._ending.is_set():
-            if not select.select([number], [], [], STOP_PERIOD)[0]:
+            if not select.select([number], [], [], SHUTDOWN_POLL_PERIOD)[0]:
                 continue
             data = os.read(number, 256)
             keys = keys_of(data)

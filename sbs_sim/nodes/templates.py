@@ -66,17 +66,17 @@ class Template:
         self._views = {kind: body[: len(body) // width * width].view(f"u{width}") for kind, width in _WIDTHS.items()}
         self._views[DOUBLE] = self._views[COUNT].view(np.float64)
         self._views[INT] = self._views[UINT].view(np.int32)
-        self._places = {name: (offsets[name] - HEAD) // _WIDTHS[kind] for name, kind in fields.items()}
+        self._indices = {name: (offsets[name] - HEAD) // _WIDTHS[kind] for name, kind in fields.items()}
         self._verify(own, fields)
         self._bytes[:] = np.frombuffer(first, np.uint8)
 
     def view(self, kind: str) -> NDArray[Any]:
-        """All of the message as numbers of a kind; those at `places` are written."""
+        """All of the message as numbers of a kind; those at `indices` are written."""
         return self._views[kind]
 
-    def places(self, names: Sequence[str]) -> NDArray[np.int64]:
+    def indices(self, names: Sequence[str]) -> NDArray[np.int64]:
         """Where numbers of one kind are in its view."""
-        return np.array([self._places[name] for name in names], dtype=np.int64)
+        return np.array([self._indices[name] for name in names], dtype=np.int64)
 
     def data(self) -> bytes:
         """The message as it is now."""
@@ -87,7 +87,7 @@ class Template:
         for name, kind in fields.items():
             number = _some_number(kind, chance)
             _set(message, name, number)
-            self._views[kind][self._places[name]] = number
+            self._views[kind][self._indices[name]] = number
         if deserialize_message(self.data(), type(message)) != message:
             raise LayoutError(f"{_name(message)}: ROS does not read what was written into its bytes")
 

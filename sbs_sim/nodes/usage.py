@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sbs_sim.nodes.endpoints import Endpoint, endpoints
-from sbs_sim.nodes.host import Parameter
+from sbs_sim.nodes.parameters import Parameter
 from sbs_sim.terminal import command_line
 
 WIDTH = 100

@@ -18,11 +18,11 @@ from sbs_sim.errors import PilotError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.pilot.feedback import Compensator, ComplexArray, Margin, Plant, closed_loop_poles, lqr, margins
-from sbs_sim.pilot.hover_hold import AUTHORITY, DELAY, FILTER_TIME, LIMITS, LONGEST_GAP, TICK, checked_body
+from sbs_sim.pilot.hover_hold import AUTHORITY, DELAY, FILTER_TIME, LIMITS, MAX_STATE_INTERVAL, TICK, checked_body
 
 Array = NDArray[np.float64]
 
-LEAST_DOUBLING_TIME = 10.0  # s, of what is left to the pilot: speed or spiral may diverge slowly
+MIN_DOUBLING_TIME = 10.0  # s, of what is left to the pilot: speed or spiral may diverge slowly
 FED_BACK = ("q", "theta", "p", "phi", "r")
 
 
@@ -57,7 +57,7 @@ def augmentation(model: LinearModel) -> Augmentation:
     Raises
     ------
     PilotError
-        With all its states the model doubles a departure in less than `LEAST_DOUBLING_TIME`.
+        With all its states the model doubles a departure in less than `MIN_DOUBLING_TIME`.
     """
     body = [model.state_names.index(name) for name in S.LINEAR_BODY_NAMES]
     settled_a, settled_b, _, _ = settle(model.a, model.b, body)
@@ -74,7 +74,7 @@ def augmentation(model: LinearModel) -> Augmentation:
     feedback = _compensator(gains[:, :n], gains[:, n:])
     poles = closed_loop_poles(plant, feedback, TICK, DELAY)
     worst = poles[np.argmax(poles.real)]
-    if worst.real > math.log(2.0) / LEAST_DOUBLING_TIME:
+    if worst.real > math.log(2.0) / MIN_DOUBLING_TIME:
         raise PilotError(f"augmented, the complete model has a pole at {worst:.3g} rad/s: fly another condition")
     found = margins(plant, feedback, TICK, DELAY)
     senses = np.array([effect.sense for effect in model.control_effects])
@@ -132,7 +132,7 @@ class StickPilot:
             A value that is not finite; nothing has changed then.
         """
         values = checked_body(time, body)
-        elapsed = TICK if self._time is None else min(max(time - self._time, 0.0), LONGEST_GAP)
+        elapsed = TICK if self._time is None else min(max(time - self._time, 0.0), MAX_STATE_INTERVAL)
         self._time = time
         wanted = np.zeros(len(self.trim))
         if self.augmented:

@@ -18,10 +18,10 @@ from sbs_sim.errors import PilotError
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating]
 
-LOWEST_FREQUENCY = 0.02  # rad/s
+MIN_FREQUENCY = 0.02  # rad/s
 FREQUENCIES = 800  # from there to half the sampling rate
 AROUND_A_POLE = np.linspace(-4.0, 4.0, 33)  # in units of its distance from the imaginary axis
-FORGOTTEN = 1e-9  # poles of discrete time as near to the origin as this are delays
+DELAY_POLE_RADIUS = 1e-9  # discrete-time poles closer to the origin are pure delays
 BATCH = 200  # frequencies that are computed together
 
 
@@ -159,15 +159,15 @@ def closed_loop(plant: Plant, compensator: Compensator, tick: float, delay: int)
     first, last = n + states, n + states + (delay - 1) * m
     matrix[:n, last:] = b
     matrix[first : first + m, : n + states] = now
-    for place in range(first + m, last + m, m):
-        matrix[place : place + m, place - m : place] = np.eye(m)
+    for row in range(first + m, last + m, m):
+        matrix[row : row + m, row - m : row] = np.eye(m)
     return matrix
 
 
 def closed_loop_poles(plant: Plant, compensator: Compensator, tick: float, delay: int) -> ComplexArray:
     """Poles of the loop as those of continuous time, log(z) / tick [rad/s], slowest first, without pure delays."""
     z = np.linalg.eigvals(closed_loop(plant, compensator, tick, delay)).astype(complex)
-    return slowest_first(np.log(z[np.abs(z) > FORGOTTEN]) / tick)
+    return slowest_first(np.log(z[np.abs(z) > DELAY_POLE_RADIUS]) / tick)
 
 
 def margins(plant: Plant, compensator: Compensator, tick: float, delay: int) -> tuple[Margin, ...]:
@@ -203,11 +203,11 @@ def disk_phase(disk: float) -> float:
 def frequencies(plant: Plant, tick: float) -> Array:
     """Where to look [rad/s]: evenly over the logarithm, and closely around the poles of the plant."""
     highest = math.pi / tick
-    w = np.geomspace(LOWEST_FREQUENCY, highest, FREQUENCIES)
+    w = np.geomspace(MIN_FREQUENCY, highest, FREQUENCIES)
     poles = np.linalg.eigvals(plant.a)
-    for pole in poles[poles.imag > LOWEST_FREQUENCY]:
+    for pole in poles[poles.imag > MIN_FREQUENCY]:
         w = np.concatenate([w, pole.imag + AROUND_A_POLE * abs(pole.real)])
-    return np.unique(w[(w >= LOWEST_FREQUENCY) & (w < highest)])
+    return np.unique(w[(w >= MIN_FREQUENCY) & (w < highest)])
 
 
 def loop_gain(plant: Plant, compensator: Compensator, tick: float, delay: int, w: Array) -> ComplexArray:
@@ -228,8 +228,8 @@ def loop_gain(plant: Plant, compensator: Compensator, tick: float, delay: int, w
 
 
 def _least(size: Array, w: Array, stable: bool) -> tuple[float, float]:
-    place = int(np.argmax(size))
-    return (1.0 / float(size[place]) if stable else 0.0), float(w[place])
+    index = int(np.argmax(size))
+    return (1.0 / float(size[index]) if stable else 0.0), float(w[index])
 
 
 def _classical(loop: ComplexArray) -> tuple[float, float, float]:

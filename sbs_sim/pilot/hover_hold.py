@@ -50,9 +50,9 @@ LIMIT_RANGE = 1e-4, 1e4  # of any of them
 AUTHORITY = math.radians(5.0)  # rad, largest departure of a control from its trim
 REACH = 1.5  # m; a target that is farther away counts as this far, which limits attitude and speed on the way
 TURN_REACH = math.radians(30.0)  # rad, likewise for the heading
-LONGEST_GAP = 0.1  # s between two states that integrals go on over
+MAX_STATE_INTERVAL = 0.1  # s between two states that integrals go on over
 AT_REST = 1e-9  # m/s, rad/s
-LARGEST = 1e9  # of any value of a state that can be flown by: squares and products of them stay numbers
+MAX_STATE_VALUE = 1e9  # of any value of a state that can be flown by: squares and products of them stay numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +106,9 @@ class HoverModel(ByContent):
         return cls(*values)
 
     def plant(self) -> Plant:
-        """All states, then place and heading; the measured ones are body states, place and heading."""
+        """All states, then position and heading; the measured ones are body states, position and heading."""
         n = len(self.state_names)
-        a, b = _with_place(self.state_names, self.a, self.b, self.pitch, self.roll)
+        a, b = _with_position(self.state_names, self.a, self.b, self.pitch, self.roll)
         measured = [self.state_names.index(name) for name in S.LINEAR_BODY_NAMES] + list(range(n, n + len(HELD)))
         return Plant(a, b, np.eye(n + len(HELD))[measured])
 
@@ -206,17 +206,17 @@ def design_matrices(model: HoverModel) -> tuple[Array, Array]:
     """a, shape (20, 20), and b, shape (20, 4), of what the gains are designed for; the states are `STATES`."""
     body = [model.state_names.index(name) for name in S.LINEAR_BODY_NAMES]
     reduced_a, reduced_b, _, _ = settle(model.a, model.b, body)
-    place_a, place_b = _with_place(S.LINEAR_BODY_NAMES, reduced_a, reduced_b, model.pitch, model.roll)
+    position_a, position_b = _with_position(S.LINEAR_BODY_NAMES, reduced_a, reduced_b, model.pitch, model.roll)
     n, held, m = len(MEASURED), len(HELD), len(S.CONTROL_NAMES)
     a = np.zeros((len(STATES),) * 2)
-    a[:n, :n] = place_a
+    a[:n, :n] = position_a
     a[n : n + held, n - held : n] = np.eye(held)
-    a[:n, n + held :] = place_b  # what moves the aircraft is the control behind its lag
+    a[:n, n + held :] = position_b  # what moves the aircraft is the control behind its lag
     a[n + held :, n + held :] = -np.eye(m) / FILTER_TIME
     return a, np.vstack([np.zeros((n + held, m)), np.eye(m) / FILTER_TIME])
 
 
-def _with_place(names: tuple[str, ...], a: Array, b: Array, pitch: float, roll: float) -> tuple[Array, Array]:
+def _with_position(names: tuple[str, ...], a: Array, b: Array, pitch: float, roll: float) -> tuple[Array, Array]:
     """Append forward, right, down and heading: their rates near hover (theory.md section 1.1)."""
     n = len(names)
     wide = np.zeros((n + len(HELD),) * 2)
@@ -272,10 +272,12 @@ class HoverHold:
         PilotError
             A number that is not finite.
         """
-        place = checks.array("position", position, PilotError)
-        if place.shape != (3,) or not np.all(np.abs(place) <= LARGEST):
-            raise PilotError(f"position = {checks.shown(place.tolist())}: allowed are 3 numbers up to {LARGEST:g} m")
-        self._wanted = (place, checks.number("heading", heading, -LARGEST, LARGEST, "rad", PilotError))
+        target = checks.array("position", position, PilotError)
+        if target.shape != (3,) or not np.all(np.abs(target) <= MAX_STATE_VALUE):
+            raise PilotError(
+                f"position = {checks.shown(target.tolist())}: allowed are 3 numbers up to {MAX_STATE_VALUE:g} m"
+            )
+        self._wanted = (target, checks.number("heading", heading, -MAX_STATE_VALUE, MAX_STATE_VALUE, "rad", PilotError))
 
     def controls(self, time: float, body: ArrayLike) -> Array:
         """Pilot controls [rad], shape (4,), of a state.
@@ -296,7 +298,7 @@ class HoverHold:
         heading, pitch, roll = quaternion_to_euler(values[S.ATTITUDE : S.VELOCITY])
         if self._time is not None and time < self._time:
             self.restart()
-        elapsed = TICK if self._time is None else min(time - self._time, LONGEST_GAP)
+        elapsed = TICK if self._time is None else min(time - self._time, MAX_STATE_INTERVAL)
         self._time = time
         self._aim(values[: S.ATTITUDE], heading)
         error, within = self._error(values[: S.ATTITUDE], heading)
@@ -325,8 +327,8 @@ class HoverHold:
     def _error(self, position: Array, heading: float) -> tuple[Array, NDArray[np.bool_]]:
         """Departure from the target, north, east, down, heading, cut to what is reached for; and where it was not."""
         assert self.target is not None
-        place, course = self.target
-        error = position - place
+        target, course = self.target
+        error = position - target
         turn = math.remainder(heading - course, 2.0 * math.pi)
         far = max(1.0, math.hypot(error[0], error[1]) / REACH)
         high, around = max(1.0, abs(error[2]) / REACH), max(1.0, abs(turn) / TURN_REACH)
@@ -346,9 +348,11 @@ def checked_body(time: float, body: ArrayLike) -> Array:
     if values.ndim != 1 or len(values) < S.BODY_SIZE:
         raise PilotError(f"state has the shape {values.shape}: allowed are {S.BODY_SIZE} numbers or more")
     values = values[: S.BODY_SIZE]
-    checks.number("time", time, -LARGEST, LARGEST, "s", PilotError)
-    if not np.all(np.abs(values) <= LARGEST):  # false for a NaN as well
-        raise PilotError(f"state {values.tolist()} at {time:g} s: allowed are -{LARGEST:g} to {LARGEST:g}")
+    checks.number("time", time, -MAX_STATE_VALUE, MAX_STATE_VALUE, "s", PilotError)
+    if not np.all(np.abs(values) <= MAX_STATE_VALUE):  # false for a NaN as well
+        raise PilotError(
+            f"state {values.tolist()} at {time:g} s: allowed are -{MAX_STATE_VALUE:g} to {MAX_STATE_VALUE:g}"
+        )
     if not values[S.ATTITUDE : S.VELOCITY].any():
         raise PilotError("state: attitude = 0: allowed is a quaternion")
     return values

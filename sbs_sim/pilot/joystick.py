@@ -56,16 +56,16 @@ class JoystickFile(ByContent):
         PilotError
             One line that names the file and every wrong key with its value and what is allowed, or the pads there are.
         """
-        place = checks.path("config", path, PilotError) if path else config_folder() / "joystick.yaml"
+        file = checks.path("config", path, PilotError) if path else config_folder() / "joystick.yaml"
         try:
-            if not os.path.isfile(place):  # no too for names that no file can have
+            if not os.path.isfile(file):  # no too for names that no file can have
                 raise PilotError("there is no such file")
-            data = config_file.read_yaml(place)
+            data = config_file.read_yaml(file)
             if found := validation.problems(data, _validator()):
                 raise PilotError("; ".join(found))
             checks.choice("pad", pad, data["pads"], PilotError)
         except (PilotError, config_file.UnreadableError) as error:
-            raise PilotError(f"{place}: {error}") from None
+            raise PilotError(f"{file}: {error}") from None
         return cls(
             float(data["dead_zone"]),
             float(data["expo"]),
@@ -135,7 +135,7 @@ class Joystick:
     def _now_held(self, axes: Sequence[float], buttons: Sequence[int]) -> set[tuple[str, float]]:
         """Buttons that are down: names of actions with 0, of controls to be trimmed with the sense."""
         held = {
-            (name, 0.0) for name, place in self._file.pad.get("buttons", {}).items() if _at(buttons, place, "buttons")
+            (name, 0.0) for name, index in self._file.pad.get("buttons", {}).items() if _at(buttons, index, "buttons")
         }
         for name, entry in self._file.pad.get("trims", {}).items():
             if "axis" in entry:
@@ -149,10 +149,10 @@ class Joystick:
         return held
 
 
-def _at(values: Sequence[float], place: int, what: str) -> float:
-    if place >= len(values):
-        raise PilotError(f"{what} has {len(values)} values: the pad needs {what}[{place}]")
-    value = float(values[place])
+def _at(values: Sequence[float], index: int, what: str) -> float:
+    if index >= len(values):
+        raise PilotError(f"{what} has {len(values)} values: the pad needs {what}[{index}]")
+    value = float(values[index])
     if not math.isfinite(value):
-        raise PilotError(f"{what}[{place}] = {value}: allowed are finite numbers")
+        raise PilotError(f"{what}[{index}] = {value}: allowed are finite numbers")
     return value

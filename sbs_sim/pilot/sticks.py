@@ -72,8 +72,8 @@ class KeySticks:
         if key not in KEYS:
             return False
         name, sense = KEYS[key]
-        place = CONTROL_NAMES.index(name)
-        self.position[place] = float(np.clip(self.position[place] + sense * KEY_STEP, -1.0, 1.0))
+        index = CONTROL_NAMES.index(name)
+        self.position[index] = float(np.clip(self.position[index] + sense * KEY_STEP, -1.0, 1.0))
         return True
 
     def centre(self) -> None:

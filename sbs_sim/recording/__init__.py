@@ -13,12 +13,12 @@ from sbs_sim.errors import RecordingError
 if TYPE_CHECKING:
     from sbs_sim.recording.definitions import message_definition, qos_profiles, type_hash
     from sbs_sim.recording.log import Log, Topic, read
-    from sbs_sim.recording.mcap_log import LogWriter
+    from sbs_sim.recording.log_writer import LogWriter
     from sbs_sim.recording.recovery import Recovery, recover
 
 _HOME = {
     "Log": "log",
-    "LogWriter": "mcap_log",
+    "LogWriter": "log_writer",
     "Recovery": "recovery",
     "Topic": "log",
     "message_definition": "definitions",

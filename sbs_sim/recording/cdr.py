@@ -29,9 +29,9 @@ Columns = dict[str, NDArray[Any]]
 
 HEAD = 4  # bytes in front of the message
 PADDING = 3  # bytes that may follow it
-MOST_LAYOUTS = 64  # that are kept to compare messages with
+MAX_LAYOUTS = 64  # that are kept to compare messages with
 ZSTD = b"\x28\xb5\x2f\xfd"
-LARGEST_MESSAGE = 1 << 28  # bytes of one that was compressed
+MAX_MESSAGE_SIZE = 1 << 28  # bytes of one that was compressed
 
 
 class Layout:
@@ -177,7 +177,7 @@ class Layout:
 
 
 class Fit:
-    """Whether messages are what their type says, which must be known before they are handed to somebody.
+    """Whether messages are what their type says, to be checked before they are published.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ class Fit:
     def __init__(self, definitions: Definitions, root: str) -> None:
         self._definitions, self._root = definitions, root
         self._known: OrderedDict[int, Layout] = OrderedDict()  # by the size of the messages
-        # which cannot be told
+        # which cannot be distinguished
         self._blind = any(field.type == "wstring" for fields in definitions.values() for field in fields)
 
     def check(self, message: bytes) -> None:
@@ -197,7 +197,7 @@ class Fit:
         if self._blind or (known is not None and known.fits(message)):
             return
         self._known[len(message)] = Layout(self._definitions, self._root, message)
-        if len(self._known) > MOST_LAYOUTS:
+        if len(self._known) > MAX_LAYOUTS:
             self._known.popitem(last=False)
 
 
@@ -212,9 +212,9 @@ def plain(message: bytes) -> bytes:
     if not message.startswith(ZSTD):  # no CDR begins like that
         return message
     try:
-        if zstandard.frame_content_size(message) > LARGEST_MESSAGE:
-            raise RecordingError(f"a compressed message is larger than {LARGEST_MESSAGE} bytes")
-        return zstandard.ZstdDecompressor().decompress(message, max_output_size=LARGEST_MESSAGE)
+        if zstandard.frame_content_size(message) > MAX_MESSAGE_SIZE:
+            raise RecordingError(f"a compressed message is larger than {MAX_MESSAGE_SIZE} bytes")
+        return zstandard.ZstdDecompressor().decompress(message, max_output_size=MAX_MESSAGE_SIZE)
     except (zstandard.ZstdError, MemoryError) as error:
         raise RecordingError(f"a compressed message cannot be unpacked: {' '.join(str(error).split())}") from None
 

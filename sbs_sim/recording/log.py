@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording.cdr import Columns, decode
+from sbs_sim.recording.checked_records import Content
 from sbs_sim.recording.definitions import Definitions, Units, parse, short_name
+from sbs_sim.recording.flight_topics import FlightTopics, alike, check_flight, flights, several, unclaimed
 from sbs_sim.recording.mcap_file import RECORDING_ID, START
-from sbs_sim.recording.roles import Part, alike, check_flight, flights, several, unclaimed
-from sbs_sim.recording.scan import Content, Scan, Source, scan
+from sbs_sim.recording.scan import Scan, scan
+from sbs_sim.recording.source import Source
 
 Row = tuple[int, int, bytes]  # log time [ns], number, data
 
@@ -23,7 +25,7 @@ Row = tuple[int, int, bytes]  # log time [ns], number, data
 class Topic(Mapping[str, NDArray[Any]]):
     """The messages of a topic as arrays by the names of their fields, in the order in which they were recorded.
 
-    Fields of fields are joined by dots (`position.x`), places in lists of messages stand in brackets
+    Fields of fields are joined by dots (`position.x`), indices of lists of messages are in brackets
     (`rotors[0].flap`). See `sbs_sim.recording.cdr.decode` for the shapes. Numbers keep their types.
 
     Attributes
@@ -34,7 +36,7 @@ class Topic(Mapping[str, NDArray[Any]]):
     time_ns : ndarray of int64, shape (n,)
         Time of each message [ns].
     sequence : ndarray of int64, shape (n,)
-        Number of each message; in logs of ours a gap tells of lost ones.
+        Number of each message; in logs of this package a gap means lost ones.
     """
 
     def __init__(self, name: str, schema: Schema, rows: Sequence[Row]) -> None:
@@ -64,7 +66,7 @@ class Topic(Mapping[str, NDArray[Any]]):
         return {name: units[name] for name in self}
 
     def to_pandas(self) -> Any:
-        """A pandas.DataFrame over time [s]; of lists each place is a column, such as `rotors[0].flap[2]`.
+        """A pandas.DataFrame over time [s]; of lists each index is a column, such as `rotors[0].flap[2]`.
 
         Raises
         ------
@@ -136,7 +138,9 @@ class Log(Mapping[str, Topic]):
         How many have left their metadata in it.
     """
 
-    def __init__(self, path: Path, found: Scan, topics: Sequence[Topic], part: Part | None, alone: bool = True) -> None:
+    def __init__(
+        self, path: Path, found: Scan, topics: Sequence[Topic], part: FlightTopics | None, alone: bool = True
+    ) -> None:
         self.path = path
         self.complete = found.complete
         self.reasons = tuple(found.reasons)
@@ -245,10 +249,10 @@ class Belongings:
 
 
 def read(path: str | Path) -> Log:
-    """Read a recording, as much of it as is whole.
+    """Read a recording, as far as it is intact.
 
     Every byte that is used is covered by a checksum that is right, but in files of other writers that made none, which
-    `reasons` tells. What is missing is told by `complete` and `reasons`.
+    `reasons` says. `complete` and `reasons` say what is missing.
 
     Parameters
     ----------
@@ -258,7 +262,7 @@ def read(path: str | Path) -> Log:
     Raises
     ------
     RecordingError
-        The file cannot be read, or nothing in it is whole.
+        The file cannot be read, or no part of it is intact.
     """
     messages: dict[int, list[Row]] = {}
 
@@ -325,4 +329,4 @@ def require_something(source: Source, found: Scan) -> None:
     """
     if not found.messages and not found.complete:
         why = "; ".join(found.reasons[:3])
-        raise RecordingError(f"nothing in {source.path} can be read: no chunk of it is whole: {why}")
+        raise RecordingError(f"nothing in {source.path} can be read: it has no intact chunk: {why}")

@@ -226,12 +226,12 @@ class FileBuilder:
             (Opcode.ATTACHMENT_INDEX, _serialized(self._attachments)),
             (Opcode.METADATA_INDEX, _serialized(self._metadata)),
         ]
-        place, offsets = self.size, []
+        offset, offsets = self.size, []
         for opcode, records in groups:
             if records:
-                offsets.append(SummaryOffset(opcode, place, len(records)))
-            place += len(records)
-        offsets_start = place
+                offsets.append(SummaryOffset(opcode, offset, len(records)))
+            offset += len(records)
+        offsets_start = offset
         summary = b"".join(records for _, records in groups) + _serialized(offsets)
         unsigned = serialize(Footer(self.size, offsets_start, 0))[:-4]
         return summary + unsigned + struct.pack("<I", zlib.crc32(summary + unsigned)) + MAGIC
@@ -253,7 +253,7 @@ class NewFile:
     Attributes
     ----------
     path : Path
-        Where the file is, as far as is known, see `look`.
+        Where the file is, as far as is known, see `check_file`.
 
     Raises
     ------
@@ -280,31 +280,31 @@ class NewFile:
             while left:
                 left = left[os.write(self._descriptor, left) :]
         except OSError as error:
-            with contextlib.suppress(OSError):  # half a record helps nobody
+            with contextlib.suppress(OSError):  # a partial record is of no use
                 os.ftruncate(self._descriptor, self._size)
             raise RecordingError(f"cannot write {self.path}: {reason(error)}") from None
         self._size += len(data)
 
-    def look(self) -> None:
+    def check_file(self) -> None:
         """Follow a file that was given another name.
 
         Raises
         ------
         RecordingError
-            It was deleted, or somebody else has written into it: what is written from now on would be lost.
+            It was deleted, or another program has written into it: further writes would be lost.
         """
         if not self._is_at(self.path):
-            self.path = self._other_place()
+            self.path = self._present_path()
         if os.fstat(self._descriptor).st_size != self._size:
-            raise RecordingError(f"{self.path} was overwritten by somebody else while it was written")
+            raise RecordingError(f"{self.path} was overwritten by another program during the recording")
 
-    def _other_place(self) -> Path:
+    def _present_path(self) -> Path:
         """Where the file is now, if it is anywhere and the system tells (Linux)."""
         with contextlib.suppress(OSError):
-            place = Path(os.readlink(f"/proc/self/fd/{self._descriptor}"))
+            path = Path(os.readlink(f"/proc/self/fd/{self._descriptor}"))
             # NFS keeps a deleted file under such a name, until it is closed
-            if os.fstat(self._descriptor).st_nlink and self._is_at(place) and not place.name.startswith(".nfs"):
-                return place
+            if os.fstat(self._descriptor).st_nlink and self._is_at(path) and not path.name.startswith(".nfs"):
+                return path
         raise RecordingError(f"{self.path} was deleted while it was written: what was in it is lost")
 
     def _is_at(self, path: Path) -> bool:
@@ -327,7 +327,7 @@ class NewFile:
             raise RecordingError(f"cannot write {self.path}: {reason(error)}") from None
 
     def discard(self) -> None:
-        """Close and delete it; what somebody else has put in its place stays."""
+        """Close and delete it; a file that another program has put there stays."""
         with contextlib.suppress(RecordingError):
             self.close()
         with contextlib.suppress(OSError):

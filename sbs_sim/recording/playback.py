@@ -1,4 +1,4 @@
-"""Reading a recording message by message in the order of time, begun at once and checked chunk by chunk."""
+"""Reading a recording message by message in the order of time, started at once and checked chunk by chunk."""
 
 import heapq
 import math
@@ -10,17 +10,20 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from sbs_sim.errors import RecordingError
+from sbs_sim.recording.checked_records import Content, Extent, chunk_at, loose_records_at
+from sbs_sim.recording.checksum_policy import open_recording
+from sbs_sim.recording.flight_topics import FlightTopics, check_flight, flights, unclaimed
 from sbs_sim.recording.log import require_something
-from sbs_sim.recording.roles import Part, check_flight, flights, unclaimed
-from sbs_sim.recording.scan import Content, DamageError, Extent, Scan, Source, chunk_at, open_recording, run_at, scan
+from sbs_sim.recording.scan import Scan, scan
+from sbs_sim.recording.source import DamageError, Source
 
-Entry = tuple[int, int, int, int, bytes]  # log time [ns], place of the chunk and in it, channel, data
+Entry = tuple[int, int, int, int, bytes]  # log time [ns], offset of the chunk and in it, channel, data
 
 
 class Playback:
     """A recording to be played; a context that closes it.
 
-    With a summary nothing but that is read in advance, else the whole file is.
+    Only the summary is read in advance, or the entire file if it has none.
 
     Parameters
     ----------
@@ -40,14 +43,14 @@ class Playback:
     Raises
     ------
     RecordingError
-        The file cannot be read, or is not whole.
+        The file cannot be read, or is incomplete.
     """
 
     def __init__(self, path: Path, flight: int | None = None) -> None:
         self.path = path
         self._source = Source(path)
         try:
-            self._trust, summary = open_recording(self._source)
+            self._optional, summary = open_recording(self._source)
             if summary is not None and summary.channels and summary.chunks:
                 self.schemas, self.channels, self._chunks = summary.schemas, summary.channels, summary.chunks
             else:
@@ -60,10 +63,10 @@ class Playback:
         except BaseException:
             self.close()
             raise
-        unchecked = self._trust.content and bool(self._chunks)
+        unchecked = self._optional.chunks and bool(self._chunks)
         self.warning = f"{path} has no checksums: damage cannot be found" if unchecked else ""
 
-    def _choose(self, flight: Part) -> None:
+    def _choose(self, flight: FlightTopics) -> None:
         wanted = flight.channels | unclaimed(self.channels, self.flights)
         self.channels = {number: self.channels[number] for number in self.channels if number in wanted}
         self.flights = (flight,)
@@ -73,7 +76,7 @@ class Playback:
         if not found.complete:
             require_something(self._source, found)  # else nothing could be saved
             raise RecordingError(
-                f"{self.path} is not whole ({found.reasons[0]}): `replay --recover {self.path}` saves what is"
+                f"{self.path} is incomplete ({found.reasons[0]}): `replay --recover {self.path}` saves what is intact"
             )
         return found
 
@@ -109,33 +112,33 @@ class Playback:
         """All messages in the order of their time, but for chunks that lie between the first message and the start."""
         waiting: list[Entry] = []
         first: int | None = None
-        for place, (_, earliest, latest) in sorted(self._chunks.items(), key=lambda item: (item[1][1], item[0])):
+        for offset, (_, earliest, latest) in sorted(self._chunks.items(), key=lambda item: (item[1][1], item[0])):
             while waiting and waiting[0][0] < earliest:
                 yield heapq.heappop(waiting)
             if first is not None and (earliest - first) * 1e-9 > end:
                 break
             if first is not None and (latest - first) * 1e-9 < start:
                 continue
-            content = self._content(place)
+            content = self._content(offset)
             for channel, _, log_time, _, begin, behind in content.messages:
-                heapq.heappush(waiting, (log_time, place, begin, channel, content.data[begin:behind]))
+                heapq.heappush(waiting, (log_time, offset, begin, channel, content.data[begin:behind]))
             if first is None and waiting:
                 first = waiting[0][0]
         while waiting:
             yield heapq.heappop(waiting)
 
-    def _content(self, place: int) -> Content:
-        """What was announced for a place, or an error."""
-        source, expected = self._source, self._chunks[place]
+    def _content(self, offset: int) -> Content:
+        """Content at an offset, as the summary or the scan announced it."""
+        source, expected = self._source, self._chunks[offset]
         try:
-            if source.at(place, 1)[0] == Opcode.CHUNK or not self._trust.content:
-                content, _, _ = chunk_at(source, place, source.size, self._trust.content)
+            if source.at(offset, 1)[0] == Opcode.CHUNK or not self._optional.chunks:
+                content, _ = chunk_at(source, offset, source.size, self._optional.chunks)
             else:
-                content, _ = run_at(source, place, source.size)
+                content, _ = loose_records_at(source, offset, source.size)
             _check_extent(content, expected)
         except DamageError as damage:
-            hint = f"`replay --recover {self.path}` saves what is whole"
-            raise RecordingError(f"{self.path} is damaged (byte {place}: {damage}): {hint}") from None
+            hint = f"`replay --recover {self.path}` saves what is intact"
+            raise RecordingError(f"{self.path} is damaged (byte {offset}: {damage}): {hint}") from None
         return content
 
     def schema(self, channel: Channel) -> Schema | None:

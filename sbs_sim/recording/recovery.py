@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sbs_sim.errors import RecordingError
+from sbs_sim.recording.checked_records import Content
 from sbs_sim.recording.log import require_something
 from sbs_sim.recording.mcap_file import DISTRO, MESSAGE_HEAD, RECOVERY, START, FileBuilder, Message, NewFile
-from sbs_sim.recording.scan import Content, Scan, Source, scan
+from sbs_sim.recording.scan import Scan, scan
+from sbs_sim.recording.source import Source
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class _Tally:
 
 
 def recover(path: str | Path, output: str | Path, progress: Callable[[float, float], None] | None = None) -> Recovery:
-    """Write all that is whole in a recording into a new, complete one, and read that again to be sure of it.
+    """Write everything intact of a recording into a new, complete one, and verify that by reading it.
 
     Parameters
     ----------
@@ -67,7 +69,7 @@ def recover(path: str | Path, output: str | Path, progress: Callable[[float, flo
     Raises
     ------
     RecordingError
-        Nothing in the file is whole, or one of the files cannot be read or written; then there is no output.
+        No part of the file is intact, or one of the files cannot be read or written; then there is no output.
     """
     with Source(Path(path)) as source:
         # Twice through the file: the definitions may come after the first messages that need them.
@@ -77,13 +79,13 @@ def recover(path: str | Path, output: str | Path, progress: Callable[[float, flo
         try:
             done = itertools.count(1)
 
-            def tell() -> None:
+            def report() -> None:
                 if progress is not None:
                     progress(next(done), 2 * len(found.chunks))
 
-            kept = _copy(source, found, target, tell)
+            kept = _copy(source, found, target, report)
             target.close()
-            _verify(target.path, kept, tell)
+            _verify(target.path, kept, report)
         except BaseException:
             target.discard()
             raise
@@ -105,8 +107,8 @@ def messages_of(content: Content) -> list[Message]:
     ]
 
 
-def _copy(source: Source, found: Scan, target: NewFile, tell: Callable[[], None]) -> _Tally:
-    """Write what is whole into the new file; tell what was written."""
+def _copy(source: Source, found: Scan, target: NewFile, report: Callable[[], None]) -> _Tally:
+    """Write what is intact into the new file; return the tally."""
     builder, kept = FileBuilder(), _Tally()
     builder.schemas, builder.channels = found.schemas, found.channels
     recording = dict(found.metadata).get(START, {})
@@ -118,7 +120,7 @@ def _copy(source: Source, found: Scan, target: NewFile, tell: Callable[[], None]
         target.write(builder.attachment(attachment))
 
     def take(content: Content) -> None:
-        tell()
+        report()
         messages = [message for message in messages_of(content) if message[0] in found.channels]
         if messages:
             target.write(builder.chunk(messages))
@@ -136,12 +138,12 @@ def _copy(source: Source, found: Scan, target: NewFile, tell: Callable[[], None]
     return kept
 
 
-def _verify(path: Path, kept: _Tally, tell: Callable[[], None]) -> None:
+def _verify(path: Path, kept: _Tally, report: Callable[[], None]) -> None:
     """Read the new file."""
     again = _Tally()
 
     def take(content: Content) -> None:
-        tell()
+        report()
         again.add(messages_of(content))
 
     with Source(path) as source:

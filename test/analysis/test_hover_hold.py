@@ -16,7 +16,7 @@ from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.wind import Wind
 from sbs_sim.pilot import hover_hold as H
 from sbs_sim.pilot.feedback import Compensator, Plant, closed_loop, closed_loop_poles, disk_gains, lqr, margins
-from sbs_sim.pilot.flight import fly
+from sbs_sim.pilot.piloted_flight import simulate_with_pilot
 
 SMALL = 0.02  # m, rad: near enough for a linear model
 MIRROR = {"v": -1, "p": -1, "phi": -1, "r": -1, "right": -1, "heading": -1, "lateral_cyclic": -1}
@@ -202,7 +202,7 @@ def test_a_small_departure_decays_as_the_linear_models_say(sbs, model, found, he
     """The nonlinear aircraft beside the 38 states sampled (to 2 % of the departure), and the design (to 10 %)."""
     target = np.zeros(4)
     target[held] = SMALL
-    flight = fly(sbs, model.trim, pilot_to(found, target[:3], target[3]).controls, 5.0, delay=H.DELAY)
+    flight = simulate_with_pilot(sbs, model.trim, pilot_to(found, target[:3], target[3]).controls, 5.0, delay=H.DELAY)
     quaternion = flight["qz"] * 2.0
     flown = np.vstack([errors(flight), quaternion])[held] - target[held]
     n = len(found.model.state_names)
@@ -220,7 +220,7 @@ def test_a_small_departure_decays_as_the_linear_models_say(sbs, model, found, he
 
 def test_the_slowest_decay_of_a_flight_is_the_slowest_pole(sbs, model, found):
     """Height: its poles are real, and after 6 s the slowest of them is alone."""
-    flight = fly(sbs, model.trim, pilot_to(found, (0.0, 0.0, SMALL)).controls, 9.0)
+    flight = simulate_with_pilot(sbs, model.trim, pilot_to(found, (0.0, 0.0, SMALL)).controls, 9.0)
     left = np.abs(flight["down"] - SMALL)
     rate = -np.log(left[-1] / left[700]) / 2.0
     slowest = np.abs(found.complete_poles[np.abs(found.complete_poles.imag) < 1e-6]).min()
@@ -230,7 +230,7 @@ def test_the_slowest_decay_of_a_flight_is_the_slowest_pole(sbs, model, found):
 def test_a_step_of_the_target_is_reached(sbs, model, found):
     """Beyond its reach too, with a turn, and without flying far over it."""
     place = np.array([3.0, -2.0, -1.0])
-    flight = fly(sbs, model.trim, pilot_to(found, place, 1.0).controls, 14.0)
+    flight = simulate_with_pilot(sbs, model.trim, pilot_to(found, place, 1.0).controls, 14.0)
     left = np.linalg.norm(errors(flight, place), axis=0)
     assert left[-1] < 0.03
     assert left[-1] < left[-300] < left[-600]
@@ -243,7 +243,9 @@ def test_a_step_of_the_target_is_reached(sbs, model, found):
 
 def test_integrals_trim_a_steady_wind(sbs, model, found):
     """The place is held again without an error, with other controls than in still air."""
-    flight = fly(sbs, model.trim, H.HoverHold(found).controls, 16.0, wind=Wind(velocity=(-3.0, 2.0, 0.0)))
+    flight = simulate_with_pilot(
+        sbs, model.trim, H.HoverHold(found).controls, 16.0, wind=Wind(velocity=(-3.0, 2.0, 0.0))
+    )
     assert np.linalg.norm(errors(flight), axis=0)[-1] < 2e-3
     assert np.linalg.norm(errors(flight), axis=0).max() > 0.1
     change = np.abs(flight["controls"][-1] - model.trim.controls)
@@ -255,11 +257,11 @@ def test_every_heading_is_like_north(sbs, model, found):
     turn = 2.0
     c, s = math.cos(turn), math.sin(turn)
     start, wind = trimmed_state(sbs, model.trim), Wind(velocity=(-3.0, 1.0, 0.0))
-    north = fly(sbs, start, pilot_to(found, (0.5, 0.2, 0.0)).controls, 2.0, wind=wind)
+    north = simulate_with_pilot(sbs, start, pilot_to(found, (0.5, 0.2, 0.0)).controls, 2.0, wind=wind)
     wind = Wind(velocity=(-3.0 * c - 1.0 * s, -3.0 * s + 1.0 * c, 0.0))
     start = trimmed_state(sbs, model.trim, heading=turn)
     place = (0.5 * c - 0.2 * s, 0.5 * s + 0.2 * c, 0.0)
-    turned = fly(sbs, start, pilot_to(found, place, turn).controls, 2.0, wind=wind)
+    turned = simulate_with_pilot(sbs, start, pilot_to(found, place, turn).controls, 2.0, wind=wind)
     np.testing.assert_allclose(turned["controls"], north["controls"], atol=1e-9)
     np.testing.assert_allclose(turned["north"] * c + turned["east"] * s, north["north"], atol=1e-9)
 
@@ -274,7 +276,7 @@ def test_turbulence_and_a_gust_leave_it_at_its_place(sbs, model, found):
         gust_duration=2.0,
         turbulence_seed=3,
     )
-    flight = fly(sbs, model.trim, H.HoverHold(found).controls, 10.0, wind=air, delay=1)
+    flight = simulate_with_pilot(sbs, model.trim, H.HoverHold(found).controls, 10.0, wind=air, delay=1)
     assert np.linalg.norm(errors(flight), axis=0).max() < 1.5
     assert np.abs(flight["controls"] - model.trim.controls).max() <= H.AUTHORITY
 
@@ -324,13 +326,16 @@ def test_the_first_controls_of_a_pilot_are_treated_like_all_others(sbs, model):
     highest = sbs.control_ranges["collective"][1]
     # of a state alone the swashplates are where they are told
     for start in (model.trim, trimmed_state(sbs, model.trim)):
-        flights = [fly(sbs, start, lambda t, x, c=c: [c, 0.0, 0.0, 0.0], 0.05) for c in (highest, highest + 0.3)]
+        flights = [
+            simulate_with_pilot(sbs, start, lambda t, x, c=c: [c, 0.0, 0.0, 0.0], 0.05)
+            for c in (highest, highest + 0.3)
+        ]
         np.testing.assert_array_equal(flights[1]["state"], flights[0]["state"])
     for value in (math.nan, 2.0):
         with pytest.raises(SimulationError, match=f"^collective = {value}: allowed are"):
-            fly(sbs, model.trim, lambda t, x, c=value: [c, 0.0, 0.0, 0.0], 0.05)
+            simulate_with_pilot(sbs, model.trim, lambda t, x, c=value: [c, 0.0, 0.0, 0.0], 0.05)
 
 
 def test_a_delay_out_of_range_is_refused(sbs, model, found):
     with pytest.raises(PilotError, match="delay = -1: allowed are whole numbers from 0 to 100"):
-        fly(sbs, model.trim, H.HoverHold(found).controls, 1.0, delay=-1)
+        simulate_with_pilot(sbs, model.trim, H.HoverHold(found).controls, 1.0, delay=-1)

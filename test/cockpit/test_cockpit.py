@@ -36,15 +36,15 @@ from websockets.typing import Subprotocol
 from sbs_msgs.msg import BodyState, FlightEvent, LinearModel, Mode, SimulationStatus
 from sbs_sim import Aircraft, linearize, simulate, trim
 from sbs_sim.cockpit import geometry
-from sbs_sim.cockpit.charts import PERIOD, WINDOW, History, axis_range, body_charts, rotor_charts
-from sbs_sim.cockpit.gate import refusal
-from sbs_sim.cockpit.panels import DOUBLET_LENGTH, DOUBLET_OF, DOUBLET_SIZE, KEYS, LIGHT_TURBULENCE, FlyPanel
-from sbs_sim.cockpit.playback import Recording, recordings
-from sbs_sim.cockpit.poles import NEAR, Pole, pole_figure, pole_page
+from sbs_sim.cockpit.access import refusal
+from sbs_sim.cockpit.charts import PERIOD, WINDOW, ChartHistory, axis_range, body_charts, rotor_charts
+from sbs_sim.cockpit.fly_panel import DOUBLET_LENGTH, DOUBLET_OF, DOUBLET_SIZE, KEYS, LIGHT_TURBULENCE, FlyPanel
+from sbs_sim.cockpit.poles import BODY_POLE_RADIUS, Pole, pole_figure, pole_page
 from sbs_sim.cockpit.readouts import Status, condition_here, readout, source_line
+from sbs_sim.cockpit.recorded_snapshots import RecordedSnapshots, list_logs
 from sbs_sim.cockpit.scene import COLOURS, Scene, Shown, colour_of
-from sbs_sim.cockpit.told import Trimmed, condition_words, model_page, trim_page, unsteady
-from sbs_sim.cockpit.view import Flown, View
+from sbs_sim.cockpit.trim_report import TrimResult, condition_words, model_page, trim_page, unsteady
+from sbs_sim.cockpit.view import LiveFlight, View
 from sbs_sim.cockpit.viewpoint import CAMERAS, Viewpoint
 from sbs_sim.errors import RecordingError, SimulationError
 from sbs_sim.flight.simulation import Simulation
@@ -56,7 +56,7 @@ from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.cockpit_node import serve
 from sbs_sim.nodes.conversions import StateMessages, snapshot_of
-from sbs_sim.nodes.host import LATCHED_QOS
+from sbs_sim.nodes.qos import LATCHED_QOS
 from sbs_sim.recording import read
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -197,7 +197,7 @@ def test_the_readout_says_where_the_model_does_not_hold():
 
 def test_the_history_keeps_instants_apart_and_begins_anew_after_a_jump_back():
     snapshot, _ = snapshot_of_flight()
-    history = History((*body_charts(AIRCRAFT), *rotor_charts(AIRCRAFT)))
+    history = ChartHistory((*body_charts(AIRCRAFT), *rotor_charts(AIRCRAFT)))
     assert len(history.table()) == 0
     for k in range(100):
         history.add(dataclasses.replace(snapshot, time=0.01 * k))
@@ -211,7 +211,7 @@ def test_the_history_keeps_instants_apart_and_begins_anew_after_a_jump_back():
 @pytest.mark.parametrize("period", [0.01, 0.066, 0.5])
 def test_the_history_is_as_long_however_often_it_is_drawn(period):
     snapshot, _ = snapshot_of_flight()
-    history = History(body_charts(AIRCRAFT))
+    history = ChartHistory(body_charts(AIRCRAFT))
     for k in range(int(50.0 / period)):
         history.add(dataclasses.replace(snapshot, time=period * k))
     times = history.table()[:, 0]
@@ -244,7 +244,7 @@ def test_rounding_does_not_fill_an_axis():
 
 def test_a_reset_of_a_paused_flight_is_seen():
     snapshot, _ = snapshot_of_flight()
-    history = History(body_charts(AIRCRAFT))
+    history = ChartHistory(body_charts(AIRCRAFT))
     history.add(snapshot)
     moved = snapshot.state.copy()
     moved[S.POSITION + 2] = -99.0
@@ -280,7 +280,7 @@ def test_no_name_of_a_pole_lies_on_another(name, airspeed):
         for text, box in boxes:
             assert axes.bbox.x0 <= box.x0 < box.x1 <= axes.bbox.x1, text
         shown |= {line for text, _ in boxes for line in text.split("\n")}
-    assert {f"{i} {mode.name}" for i, mode in enumerate(model.modes, 1) if abs(mode.pole) <= NEAR} <= shown
+    assert {f"{i} {mode.name}" for i, mode in enumerate(model.modes, 1) if abs(mode.pole) <= BODY_POLE_RADIUS} <= shown
 
 
 def test_a_long_name_leaves_the_map_its_room():
@@ -291,7 +291,7 @@ def test_a_long_name_leaves_the_map_its_room():
 def test_a_trim_is_shown_beside_a_flight_that_is_in_it_without_a_word_more():
     snapshot, point = snapshot_of_flight(airspeed=12.0, turn_rate=0.3)
     here = condition_here(snapshot)
-    trimmed = Trimmed(here, point.controls, point.pitch, point.roll, point.thrust.sum(), point.power.sum(), ())
+    trimmed = TrimResult(here, point.controls, point.pitch, point.roll, point.thrust.sum(), point.power.sum(), ())
     assert unsteady(trimmed, snapshot) == []
     page = Elements(trim_page(trimmed, snapshot, AIRCRAFT)).text
     assert "Trim at 12 m/s, turn 17.2 deg/s" in page
@@ -305,7 +305,7 @@ def test_a_trim_says_where_the_flight_is_not_in_it():
     state[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(0.0, math.radians(50.0), 0.0)
     state[S.RATES] = math.radians(10.0)
     tilted = dataclasses.replace(snapshot, state=state)
-    trimmed = Trimmed(TrimCondition(), point.controls, point.pitch, point.roll, 0.0, 0.0, ("stalled",))
+    trimmed = TrimResult(TrimCondition(), point.controls, point.pitch, point.roll, 0.0, 0.0, ("stalled",))
     told = "The flight is not in this trim: pitch 50.0 deg instead of 0.0, p 10.0 deg/s instead of 0.0."
     for page in (trim_page(trimmed, tilted, AIRCRAFT), model_page(trimmed, tilted)):
         assert told in page
@@ -407,7 +407,7 @@ def test_messages_that_no_flight_has_are_refused(spoil):
 
 
 def test_a_recording_gives_what_was_recorded():
-    log, recording = read(HOVER_STEP), Recording(HOVER_STEP)
+    log, recording = read(HOVER_STEP), RecordedSnapshots(HOVER_STEP)
     state, rotors = log["state"], log["rotors"]
     for i in (0, 57, len(state.time) - 1):
         found = recording.at(state.time[i] + 0.004)  # of the 10 ms until the next one
@@ -422,7 +422,7 @@ def test_a_recording_gives_what_was_recorded():
 
 def test_a_recording_knows_the_controls_of_every_time():
     # tools/make_hover_step.py: each control is raised by 0.5 deg for 0.3 s, one every 0.8 s from 0.5 s on
-    recording = Recording(HOVER_STEP)
+    recording = RecordedSnapshots(HOVER_STEP)
     rest = AIRCRAFT.unmix(recording.at(0.3).swashplate)
     for i in range(4):
         step = AIRCRAFT.unmix(recording.at(0.5 + 0.8 * i + 0.2).swashplate) - rest
@@ -431,10 +431,10 @@ def test_a_recording_knows_the_controls_of_every_time():
 
 def test_what_is_no_log_is_told_in_one_line(tmp_path):
     (tmp_path / "a.mcap").write_bytes(b"nothing")
-    assert [path.name for path in recordings(tmp_path)] == ["a.mcap"]
-    assert recordings(tmp_path / "nowhere") == []
+    assert [path.name for path in list_logs(tmp_path)] == ["a.mcap"]
+    assert list_logs(tmp_path / "nowhere") == []
     with pytest.raises(RecordingError, match=r"a\.mcap"):
-        Recording(tmp_path / "a.mcap")
+        RecordedSnapshots(tmp_path / "a.mcap")
 
 
 def test_euler_angles_of_the_charts():
@@ -638,7 +638,7 @@ def test_who_looks_keeps_the_view_of_an_aircraft_of_another_size():
 @pytest.mark.parametrize(("width", "factor"), [(1280, 1.0), (720, 1.0), (400, 1.8)])
 def test_a_narrow_picture_is_taken_from_further_away(width, factor):
     with looking(width, 800) as (viewpoint, client):
-        viewpoint.place(client, "left")
+        viewpoint.set_camera(client, "left")
         np.testing.assert_allclose(client.camera.position, factor * np.array(CAMERAS["left"]), rtol=1e-6)
         np.testing.assert_allclose(client.camera.look_at, 0.0, atol=1e-12)
 
@@ -689,7 +689,7 @@ def test_an_aircraft_after_another_is_drawn_under_names_of_its_own(tmp_path):
     try:
         view = View(server, Commanded(), lambda: None, tmp_path)
         for i, name in enumerate(("sbs", "tandem", "sbs"), 1):
-            view.fly(Flown(craft(name), (), -100.0, 1.0))
+            view.show_flight(LiveFlight(craft(name), (), -100.0, 1.0))
             roots = [j for j in range(5) if server.scene.get_handle_by_name(f"/ned{j}/body") is not None]
             assert roots == [i]
     finally:
@@ -1035,7 +1035,7 @@ def test_a_log_is_replayed_in_the_same_view(page):
     page.get_by_role("tab", name="Logs").click()
     choose(page, "hover_step.mcap", "hover_step.mcap paused")  # at its end after four seconds
     times = page.get_by_role("row", name="time").first.inner_text().split()
-    assert float(times[1]) == pytest.approx(Recording(HOVER_STEP).end, abs=0.02)
+    assert float(times[1]) == pytest.approx(RecordedSnapshots(HOVER_STEP).end, abs=0.02)
 
 
 def test_in_the_view_of_a_log_keys_move_the_log_and_not_the_hidden_flight(flying, page):

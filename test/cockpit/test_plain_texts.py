@@ -15,7 +15,7 @@ from sbs_sim.analysis.monte_carlo_plots import batch_figure
 from sbs_sim.analysis.sweep_plots import save_plots
 from sbs_sim.cockpit.poles import Pole, pole_page
 from sbs_sim.cockpit.readouts import Status, readout, source_line
-from sbs_sim.cockpit.told import Trimmed, line, model_page, trim_page
+from sbs_sim.cockpit.trim_report import TrimResult, line, model_page, trim_page
 from sbs_sim.errors import AircraftError
 from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight.trim_point import TrimCondition
@@ -53,7 +53,7 @@ def test_the_search_would_find_markup():
 
 
 def test_what_the_cockpit_shows_of_others_is_text(hostile, snapshot):
-    trimmed = Trimmed(TrimCondition(), np.zeros(4), 0.0, 0.0, 0.0, 0.0, (HOSTILE,))
+    trimmed = TrimResult(TrimCondition(), np.zeros(4), 0.0, 0.0, 0.0, 0.0, (HOSTILE,))
     for page in (
         readout(hostile, snapshot, Status(), hostile.name),
         *(readout(hostile, snapshot, Status(**{field: HOSTILE}), "sbs") for field in ("fault", "log_state")),
@@ -79,7 +79,7 @@ def test_the_cockpit_has_no_panel_of_markdown():
 
 def test_what_goes_onto_the_page_as_html_is_made_in_places_that_escape():
     """A name that comes from a file has no way around: f-strings of HTML are in these modules alone."""
-    allowed = {"charts", "dress", "poles", "readouts", "told", "view"}
+    allowed = {"charts", "page_head", "poles", "readouts", "trim_report", "view"}
     for path in (PACKAGE / "cockpit").glob("*.py"):
         tree = ast.parse(path.read_text())
         made = [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) and "</" in ast.unparse(node)]

@@ -17,11 +17,11 @@ from sbs_sim.analysis.batch import Case, simulate_batch
 from sbs_sim.analysis.monte_carlo import gust_cases
 from sbs_sim.errors import AircraftError, RecordingError, SbsError
 from sbs_sim.model.wind import Wind
-from sbs_sim.pilot.flight import fly
 from sbs_sim.pilot.joystick import JoystickFile
+from sbs_sim.pilot.piloted_flight import simulate_with_pilot
 from sbs_sim.recording import LogWriter, qos_profiles, read
-from sbs_sim.recording.flight import flight_of
 from sbs_sim.recording.plot import plot
+from sbs_sim.recording.recorded_flight import flight_of
 
 INPUTS = 15  # per target and unit of its share
 # The same ones each time, and no search for a smaller one: the first that fails says enough, and chance is the tool's.
@@ -94,7 +94,10 @@ WRONG_TYPES = {
         lambda ac: gust_cases(ac, 10**9, {}, turbulence=1.0),
         "flights = 1000000000: allowed are whole numbers from 1 to 1000000",
     ),
-    "number for a pilot": (lambda ac: fly(ac, None, 3, 0.1), "pilot = 3: allowed are functions of time and state"),
+    "number for a pilot": (
+        lambda ac: simulate_with_pilot(ac, None, 3, 0.1),
+        "pilot = 3: allowed are functions of time and state",
+    ),
     "number for the file of a model": (lambda ac: linearize(ac).save(3), "path = 3: allowed are paths"),
     "number for a path": (lambda ac: ac.value(3), "path = 3: allowed are keys like body.mass"),
     "control characters in a path": (
@@ -179,7 +182,7 @@ def test_a_value_that_no_file_could_hold_is_refused(sbs, value):
 
 def test_no_name_of_an_aircraft_leads_out_of_the_folder_of_logs(tmp_path):
     pytest.importorskip("rclpy")
-    from sbs_sim.nodes.recorder import log_path
+    from sbs_sim.nodes.flight_log import log_path
 
     begin = datetime.datetime(2026, 1, 2, 3, 4, 5)
     for name in ("../../x", "/etc/x", "a\0b", "a\nb", "..", "x" * 500, "ж/ж"):
@@ -225,7 +228,7 @@ def test_what_a_log_calls_its_types_and_topics_executes_nothing():
     from mcap.records import Channel, Schema
 
     from sbs_sim.errors import SbsError
-    from sbs_sim.nodes.replay import installed_type
+    from sbs_sim.nodes.message_types import installed_type
 
     channel = Channel(id=1, topic="/x", message_encoding="cdr", metadata={}, schema_id=1)
     kind = installed_type(channel, Schema(id=1, name="sbs_msgs/msg/Controls", encoding="ros2msg", data=b""))

@@ -16,10 +16,10 @@ from sbs_msgs.action import Sweep  # noqa: E402
 from sbs_msgs.msg import Controls  # noqa: E402
 from sbs_msgs.srv import Linearize, Reset, SetWind, Trim  # noqa: E402
 from sbs_sim.errors import SbsError  # noqa: E402
-from sbs_sim.nodes.arrivals import Arrivals  # noqa: E402
-from sbs_sim.nodes.host import COMMAND_QOS  # noqa: E402
+from sbs_sim.nodes.command_monitor import CommandMonitor  # noqa: E402
 from sbs_sim.nodes.number_fields import check_numbers, scalars  # noqa: E402
 from sbs_sim.nodes.pilot_conversions import to_target  # noqa: E402
+from sbs_sim.nodes.qos import COMMAND_QOS  # noqa: E402
 
 FAINT = 5e-324  # an integer of one digit, to CPython until 3.11; later ones have some units of that
 TOLD = r"an integer in a float field\?"
@@ -89,7 +89,7 @@ def test_arrays_are_converted_by_rclpy():
 def test_a_command_that_fades_away_is_no_integer(tmp_path):
     """The output of a filter passes the smallest numbers on its way to zero, or stays among them for good."""
     with world(next(DOMAINS), tmp_path) as made:
-        arrivals = Arrivals(made.client.node, Controls, "controls", COMMAND_QOS)
+        arrivals = CommandMonitor(made.client.node, Controls, "controls", COMMAND_QOS)
         value = 0.1
         for _ in range(2000):
             value *= 0.5

@@ -18,7 +18,7 @@ rclpy = pytest.importorskip("rclpy")
 from ros_harness import DOMAINS, EXECUTABLES, environment, world  # noqa: E402
 
 from sbs_msgs.msg import BodyState  # noqa: E402
-from sbs_sim.nodes.host import run  # noqa: E402
+from sbs_sim.nodes.process import run  # noqa: E402
 
 IS_OLD_DDS = "/libfastrtps.so" in Path("/proc/self/maps").read_text()
 ROOT = Path(__file__).resolve().parents[2]
@@ -106,7 +106,7 @@ def test_the_user_has_the_last_word_on_the_network(tmp_path):
     text = (ROOT / "config" / "loopback.xml").read_text()
     profile.write_text(text.replace("<rtps>", "<rtps><name>/own_name</name>"))
     names = (READ_BY_DDS, "ROS_AUTOMATIC_DISCOVERY_RANGE")
-    code = "from sbs_sim.nodes import host; host.keep_to_this_machine()"
+    code = "from sbs_sim.nodes import confinement; confinement.keep_to_this_machine()"
     code += f"; import os; print(*map(os.environ.get, {names}))"
     own = {**environment(next(DOMAINS)), names[0]: str(profile), names[1]: "LOCALHOST"}
     ended = subprocess.run([sys.executable, "-c", code], env=own, capture_output=True, text=True, check=True)
@@ -114,7 +114,7 @@ def test_the_user_has_the_last_word_on_the_network(tmp_path):
 
 
 def test_where_ros_is_for_the_network_nothing_is_changed():
-    code = "from sbs_sim.nodes import host; host.keep_to_this_machine()"
+    code = "from sbs_sim.nodes import confinement; confinement.keep_to_this_machine()"
     name = "ROS_AUTOMATIC_DISCOVERY_RANGE"
     code += f"; import os; print('{READ_BY_DDS}' in os.environ, os.environ['{name}'])"
     own = {key: value for key, value in environment(1).items() if "PROFILES_FILE" not in key}
@@ -189,7 +189,7 @@ def test_temporary_files_are_of_the_user_alone(tmp_path, monkeypatch):
     import fuzz_targets
 
     from sbs_sim.recording import read
-    from sbs_sim.recording.flight import flight_of
+    from sbs_sim.recording.recorded_flight import flight_of
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     (tmp_path / "a.mcap").write_bytes(fuzz_targets.SMALL_LOG)

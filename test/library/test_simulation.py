@@ -15,7 +15,7 @@ from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.state import ATTITUDE, BODY_SIZE, CONTROL_NAMES, POSITION, RATES, VELOCITY
 from sbs_sim.model.wind import Wind
-from sbs_sim.pilot import flight as piloted
+from sbs_sim.pilot.piloted_flight import simulate_with_pilot
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 DEG = math.pi / 180
@@ -458,13 +458,13 @@ def test_a_step_that_no_actuator_follows_is_flown_and_told(sbs, hover):
 
 
 def test_actuators_are_those_of_the_live_flight(sbs, hover):
-    """The mixer's: what is beyond is clipped and told, the swashplates take their time; bit for bit `pilot.flight`."""
+    """The mixer's: what is beyond is clipped and told, the swashplates take their time; bit for bit as with a pilot."""
     wanted = beyond(hover, "longitudinal_cyclic", 15.0)
     flight = simulate(sbs, hover, wanted, 0.3, actuators=True)
     assert flight.warnings == ("clipped: longitudinal_cyclic at its limit of 12 deg",)
     expected = np.minimum(120.0 * flight["time"], 12.0)
     np.testing.assert_allclose(np.degrees(flight["swashplate"][:, 0, 2]), expected, atol=1e-9)
-    live = piloted.fly(sbs, hover, lambda time, state: wanted, 0.3)
+    live = simulate_with_pilot(sbs, hover, lambda time, state: wanted, 0.3)
     for name, values in live.items():
         assert flight[name].tobytes() == values.tobytes(), name
     assert live.warnings == flight.warnings

@@ -109,7 +109,7 @@ def test_two_pilots_are_named_and_a_lost_one_is_missed(flight, hover):
     other.destroy_node()
     client.next("diagnostics", lambda a: (s := mixer_status(a)) and "publishers of controls" not in s.message)
     client.node.destroy_publisher(client._publishers.pop("controls"))
-    client.next("diagnostics", told(client, "nobody publishes controls any more, the last ones are held"))
+    client.next("diagnostics", told(client, "controls has lost its publisher, the last command is held"))
 
 
 def test_a_killed_mixer_is_missed_and_a_new_one_joins(tmp_path, hover):
@@ -127,7 +127,7 @@ def test_a_killed_mixer_is_missed_and_a_new_one_joins(tmp_path, hover):
 
         def missed(array):
             found = next((status for status in array.status if status.name == "simulator"), None)
-            return found and "nobody publishes swashplate any more, the last ones are held" in found.message
+            return found and "swashplate has lost its publisher, the last command is held" in found.message
 
         client.next("diagnostics", missed)
         made.start("control_mixer")

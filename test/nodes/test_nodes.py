@@ -42,7 +42,7 @@ from sbs_msgs.msg import (  # noqa: E402
 )
 from sbs_msgs.srv import Reset, SetWind, Step  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
-from sbs_sim.nodes.host import SERVICE_QOS  # noqa: E402
+from sbs_sim.nodes.qos import SERVICE_QOS  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
 
 TOPICS = {
@@ -696,7 +696,7 @@ def test_an_interruption_during_a_long_service_does_not_wait_for_it(own_world):
 
 INTERRUPTED_IN_THE_LOCK = """
 import os, signal, sys, threading
-from sbs_sim.nodes.host import run
+from sbs_sim.nodes.process import run
 
 class Busy(threading.Event):
     def wait(self, timeout=None):

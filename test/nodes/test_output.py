@@ -18,7 +18,7 @@ from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, controls_message, enviro
 from std_srvs.srv import SetBool  # noqa: E402
 
 from sbs_msgs.msg import BodyState, Controls  # noqa: E402
-from sbs_sim.nodes.output import Unheeded  # noqa: E402
+from sbs_sim.nodes.standard_streams import NonBlockingWriter  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
 
 WARNING = "controls rejected: "
@@ -90,7 +90,7 @@ def test_a_reader_who_is_slow_gets_all_and_one_who_is_gone_disturbs_nobody():
 
     thread = threading.Thread(target=work)
     thread.start()
-    stream = io.TextIOWrapper(io.BufferedWriter(Unheeded(writer)), line_buffering=True)
+    stream = io.TextIOWrapper(io.BufferedWriter(NonBlockingWriter(writer)), line_buffering=True)
     for line in lines:
         print(line, end="", file=stream)
     os.close(writer)
@@ -98,7 +98,7 @@ def test_a_reader_who_is_slow_gets_all_and_one_who_is_gone_disturbs_nobody():
     assert b"".join(read_slowly).decode() == "".join(lines)
     reader, writer = os.pipe()
     os.close(reader)
-    stream = io.TextIOWrapper(io.BufferedWriter(Unheeded(writer)), line_buffering=True)
+    stream = io.TextIOWrapper(io.BufferedWriter(NonBlockingWriter(writer)), line_buffering=True)
     print("nobody hears this", file=stream)
     os.close(writer)
 

@@ -17,7 +17,8 @@ from test_flight_loop import AS_FAST_AS_READ, flying, wait_until  # noqa: E402
 from sbs_sim import Simulation  # noqa: E402
 from sbs_sim.errors import SimulationError  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
-from sbs_sim.recording.flight import flight_of, verify  # noqa: E402
+from sbs_sim.recording.recorded_flight import flight_of  # noqa: E402
+from sbs_sim.recording.verification import verify  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "robustness"))
 import schedules  # noqa: E402

@@ -20,7 +20,7 @@ from sbs_msgs.msg import BodyState, Controls, FlightEvent  # noqa: E402
 from sbs_msgs.srv import Reset  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.model.state import CONTROL_NAMES  # noqa: E402
-from sbs_sim.nodes.host import EVENT_QOS  # noqa: E402
+from sbs_sim.nodes.qos import EVENT_QOS  # noqa: E402
 from sbs_sim.pilot.sticks import shaped  # noqa: E402
 
 TRIM = trim(Aircraft.load("sbs")).controls

@@ -14,9 +14,9 @@ from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import state as S
 from sbs_sim.pilot.augmentation import FED_BACK, StickPilot, augmentation
 from sbs_sim.pilot.feedback import Compensator, Plant, closed_loop
-from sbs_sim.pilot.flight import fly
 from sbs_sim.pilot.hover_hold import DELAY, FILTER_TIME, TICK
 from sbs_sim.pilot.joystick import Joystick, JoystickFile
+from sbs_sim.pilot.piloted_flight import simulate_with_pilot
 from sbs_sim.pilot.sticks import RETURN_TIME, KeySticks, keys_of, shaped
 
 CONFIG = (config_folder() / "joystick.yaml").read_text()
@@ -263,7 +263,7 @@ def test_augmentation_damps_every_aircraft():
         start = trimmed_state(aircraft, model.trim)
         start[S.RATES + 2] = 0.2
         free = simulate(aircraft, start, model.trim.controls, 0.5)["r"][-1]
-        assert fly(aircraft, start, pilot.controls, 0.5, delay=DELAY)["r"][-1] < free - 0.01
+        assert simulate_with_pilot(aircraft, start, pilot.controls, 0.5, delay=DELAY)["r"][-1] < free - 0.01
 
 
 # --- augmentation -----------------------------------------------------------------------------------------------
@@ -298,7 +298,7 @@ def test_a_disturbed_flight_decays_as_the_linear_model_says(sbs, model, found, p
     """From a roll rate, in the nonlinear model beside the 38 states sampled."""
     start = trimmed_state(sbs, model.trim)
     start[S.RATES] = 0.02
-    flight = fly(sbs, start, pilot.controls, 3.0, delay=DELAY)
+    flight = simulate_with_pilot(sbs, start, pilot.controls, 3.0, delay=DELAY)
     places = [model.state_names.index(name) for name in FED_BACK]
     new = -math.expm1(-TICK / FILTER_TIME)
     onto = (1.0 - new) * np.eye(4) - new * found.lag_gains
@@ -318,7 +318,7 @@ def test_without_it_the_same_flight_grows(sbs, model, pilot):
     start = trimmed_state(sbs, model.trim)
     start[S.RATES] = 0.02
     pilot.augmented = False
-    flight = fly(sbs, start, pilot.controls, 8.0)
+    flight = simulate_with_pilot(sbs, start, pilot.controls, 8.0)
     roll = np.abs(flight["qx"])
     assert roll[600:].max() > 2.0 * roll[100:300].max()
 

@@ -37,12 +37,14 @@ from sbs_msgs.msg import (  # noqa: E402
 )
 from sbs_msgs.srv import Record, Reset, SetWind, Step, Trim  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
-from sbs_sim.cockpit.playback import Recording as Flown  # noqa: E402
-from sbs_sim.nodes.replay import fly_with  # noqa: E402
+from sbs_sim.cockpit.recorded_snapshots import RecordedSnapshots  # noqa: E402
+from sbs_sim.nodes.what_if import fly_with  # noqa: E402
 from sbs_sim.recording import read, recover  # noqa: E402
-from sbs_sim.recording.flight import flight_of, verify, whole_until  # noqa: E402
 from sbs_sim.recording.plot import flight_figure  # noqa: E402
-from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
+from sbs_sim.recording.recorded_flight import complete_until, flight_of  # noqa: E402
+from sbs_sim.recording.source import Source  # noqa: E402
+from sbs_sim.recording.summary import read_summary  # noqa: E402
+from sbs_sim.recording.verification import verify  # noqa: E402
 
 # -- what is recorded ------------------------------------------------------------------------------------------------
 
@@ -126,7 +128,7 @@ def test_a_flight_of_other_topics_is_recorded_like_any(tmp_path, hover):
     assert_identical(path)
     labels = [axes.get_ylabel() for axes in flight_figure(log).axes]
     assert len(labels) == 10
-    assert Flown(path).end == pytest.approx(log["state"].time[-1])  # as the cockpit shows it
+    assert RecordedSnapshots(path).end == pytest.approx(log["state"].time[-1])  # as the cockpit shows it
     found = replay("--with", "body.mass=23", "--output", heavy, path)
     assert found.returncode == 0, found.stderr
     assert names.items() <= read(heavy).roles.items()
@@ -286,7 +288,7 @@ def test_a_log_that_has_just_begun_is_whole(tmp_path):
 def test_who_does_not_heed_a_closed_terminal_is_left_alone():
     code = """
         import signal
-        from sbs_sim.nodes.executables import when_interrupted
+        from sbs_sim.nodes.signals import when_interrupted
         signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
         when_interrupted(print)
         print(signal.getsignal(signal.SIGHUP) == signal.SIG_IGN, signal.getsignal(signal.SIGTERM) == print)
@@ -475,7 +477,7 @@ def test_a_log_begun_in_mid_flight_flies_with_a_changed_aircraft(tmp_path, hover
     changes = [f"rotors[{j}].speed_rpm=1800" for j in (0, 1)]
     fly_with(flight, changes, int(flight.steps[-1]), slow)
     wind = [read(found)["events"]["wind_step"][0] for found in (path, slow)]
-    assert wind[1] * 10 == wind[0] * 8
+    assert wind[1] * 10 == wind[0] * 8  # steps of 14.4 degrees at most: 10 to a tick at 2400 rpm, 8 at 1800
     assert_identical(slow)
 
 
@@ -591,14 +593,14 @@ def acted(log):
 @pytest.mark.parametrize("count", [1, 3])
 def test_where_a_log_begins_to_lack_commands(tmp_path, count):
     whole = read(HOVER_STEP)
-    assert whole_until(whole) == math.inf
+    assert complete_until(whole) == math.inf
     for first in range(1, 35, 5):
         log = read(without_chunks(tmp_path, slice(first, first + count)))
         lost = np.setdiff1d(acted(whole), acted(log))
         if lost.size:
-            assert lost.min() - 0.1 < whole_until(log) < lost.min() + 1e-9
+            assert lost.min() - 0.1 < complete_until(log) < lost.min() + 1e-9
         else:
-            assert whole_until(log) == math.inf
+            assert complete_until(log) == math.inf
 
 
 def numbered_log(path, events, states):
@@ -632,14 +634,14 @@ LACKING = {
 def test_commands_may_have_been_lost_behind_the_last_one(tmp_path, events, states, undamaged, damaged):
     """Only in a damaged log: states alone are left out too where the disk is slow."""
     path = numbered_log(tmp_path / "a.mcap", events, states)
-    assert whole_until(read(path)) == pytest.approx(undamaged)
+    assert complete_until(read(path)) == pytest.approx(undamaged)
     cut = tmp_path / "cut.mcap"
     with Source(path) as source:
         end = read_summary(source).start
     cut.write_bytes(path.read_bytes()[: end - 5])  # in the end of the data
     assert not recover(cut, tmp_path / "cut.recovered.mcap").complete
     for log in (read(cut), read(tmp_path / "cut.recovered.mcap")):
-        assert whole_until(log) == pytest.approx(damaged)
+        assert complete_until(log) == pytest.approx(damaged)
 
 
 def test_a_changed_aircraft_is_not_flown_without_commands_that_were_lost(tmp_path):
@@ -647,7 +649,7 @@ def test_a_changed_aircraft_is_not_flown_without_commands_that_were_lost(tmp_pat
     recover(path, tmp_path / "recovered.mcap")
     for log in (path, tmp_path / "recovered.mcap"):
         found = replay("--with", "body.mass=23", "--output", output, log)
-        end = f"{whole_until(read(log)):.3f}"
+        end = f"{complete_until(read(log)):.3f}"
         assert found.returncode == 1
         assert found.stderr == f"{log} lacks commands after {end} s: --end {end} flies those before\n"
         assert not output.exists()
@@ -672,7 +674,7 @@ def test_a_log_of_somebody_else_is_no_flight(tmp_path):
 
 
 def test_two_logs_of_a_second_have_two_names(tmp_path):
-    from sbs_sim.nodes.recorder import log_path
+    from sbs_sim.nodes.flight_log import log_path
 
     begin = datetime.datetime(2024, 5, 6, 7, 8, 9)
     names = []

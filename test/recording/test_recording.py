@@ -33,12 +33,15 @@ from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.recording import LogWriter, message_definition, qos_profiles, read, recover
 from sbs_sim.recording.cdr import Fit, Layout, decode, decode_one_by_one
+from sbs_sim.recording.checked_records import MAX_RECORD_SIZE
 from sbs_sim.recording.definitions import SEQUENCE, Units, fields_of, parse, short_name
-from sbs_sim.recording.flight import flight_of
+from sbs_sim.recording.log_writer import CHUNK_SIZE
 from sbs_sim.recording.mcap_file import NewFile, metadata_checksum
-from sbs_sim.recording.mcap_log import CHUNK_SIZE
 from sbs_sim.recording.playback import Playback
-from sbs_sim.recording.scan import LARGEST, Source, read_summary, scan
+from sbs_sim.recording.recorded_flight import flight_of
+from sbs_sim.recording.scan import scan
+from sbs_sim.recording.source import Source
+from sbs_sim.recording.summary import read_summary
 
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "robustness" / "crash_recording.py"
 NUMBER = "float64 value  # [m]\n"
@@ -749,7 +752,7 @@ def test_what_is_no_recording_is_refused_in_one_line(tmp_path, content):
     path, output = tmp_path / "file.mcap", tmp_path / "output.mcap"
     path.write_bytes(content)
     for use in (lambda: read(path), lambda: recover(path, output)):
-        with pytest.raises(RecordingError, match=rf"^nothing in {path} can be read: no chunk of it is whole: [^\n]+$"):
+        with pytest.raises(RecordingError, match=rf"^nothing in {path} can be read: it has no intact chunk: [^\n]+$"):
             use()
     assert not output.exists()
 
@@ -908,7 +911,9 @@ def test_flights_in_one_file_are_told_apart(tmp_path, names):
     for use in (log.flight, lambda: log["state"]):
         with pytest.raises((RecordingError, KeyError), match=re.escape(both)) as caught:
             use()
-        assert f"{names[1]}/state begun 1970-01-01T00:00:01.000+00:00; 2 is craft 2 on {names[0]}/state" in str(caught)
+        assert f"{names[1]}/state started 1970-01-01T00:00:01.000+00:00; 2 is craft 2 on {names[0]}/state" in str(
+            caught
+        )
     assert "state" not in log
     assert len(log[f"{names[0]}/state"].time) == (6 if names[0] == names[1] else 3)  # by its name all that there is
     assert recover(path, tmp_path / "new.mcap").complete
@@ -976,7 +981,7 @@ def test_older_logs_in_one_file_are_told(tmp_path, names):
             writer.finish()
     path = merge(tmp_path / "both.mcap", *paths)
     log = read(path)
-    alike = f"{path} holds 2 flights that cannot be told apart, for their logs had no identity yet"
+    alike = f"{path} holds 2 flights that cannot be distinguished: their logs have no identity"
     if names[0] == names[1]:
         with pytest.raises(RecordingError, match=re.escape(alike)):
             log.flight()
@@ -1056,7 +1061,7 @@ def test_playing_begins_at_once_and_ends_before_a_damage(original, tmp_path):
 def test_what_is_not_whole_is_not_played(original, tmp_path):
     path = tmp_path / "cut.mcap"
     path.write_bytes(original.data[:-30_000])
-    with pytest.raises(RecordingError, match=r"cut.mcap is not whole \(.*: `replay --recover"):
+    with pytest.raises(RecordingError, match=r"cut.mcap is incomplete \(.*: `replay --recover"):
         Playback(path)
 
 
@@ -1494,7 +1499,7 @@ def test_lengths_beyond_all_bounds_do_not_take_all_memory(tmp_path, original):
     place = min(original.chunks)[0]
     limits = resource.getrlimit(resource.RLIMIT_AS)
     present = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (present + 8 * LARGEST, limits[1]))
+    resource.setrlimit(resource.RLIMIT_AS, (present + 8 * MAX_RECORD_SIZE, limits[1]))
     try:
         for field, claim in itertools.product((1, 25, 33, 45), (2**31, 2**40, 2**63, 2**64 - 1)):
             data = bytearray(original.data)

@@ -37,10 +37,12 @@ from sbs_msgs.msg import (  # noqa: E402
 )
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.errors import RecordingError  # noqa: E402
-from sbs_sim.nodes.replay import fly_with, is_shared  # noqa: E402
+from sbs_sim.nodes.log_player import is_shared  # noqa: E402
+from sbs_sim.nodes.what_if import fly_with  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
-from sbs_sim.recording.flight import flight_of  # noqa: E402
-from sbs_sim.recording.scan import Source, read_summary  # noqa: E402
+from sbs_sim.recording.recorded_flight import flight_of  # noqa: E402
+from sbs_sim.recording.source import Source  # noqa: E402
+from sbs_sim.recording.summary import read_summary  # noqa: E402
 from sbs_sim.versions import differences, surroundings  # noqa: E402
 
 
@@ -98,7 +100,7 @@ def test_a_topic_that_somebody_else_publishes_is_not_played(tmp_path):
         refused = replay(HOVER_STEP, "--delay", 30, domain=made.domain)  # discovered before that
         made.client.spin(0.3)
         assert refused.returncode == 1
-        assert refused.stderr.startswith("somebody else publishes /clock already: ")
+        assert refused.stderr.startswith("another node publishes /clock already: ")
         assert len(refused.stderr.splitlines()) == 1
         assert "--topics" in refused.stderr
         assert "ROS_DOMAIN_ID" in refused.stderr
@@ -248,7 +250,7 @@ def test_what_a_cut_log_is_compared_with_is_said(tmp_path, recorded):
     found = replay("--verify", cut)
     assert found.returncode == 0
     assert "identical" in found.stdout
-    assert found.stderr.startswith(f"{cut} is not whole: ")
+    assert found.stderr.startswith(f"{cut} is incomplete: ")
     assert len(found.stderr.splitlines()) == 1
 
 
@@ -256,11 +258,11 @@ def test_a_log_without_states_is_no_flight(tmp_path):
     """As a simulator leaves it that is ended at once."""
     from sbs_sim.flight.simulation import Simulation
     from sbs_sim.flight.trimmed_state import trimmed_state
-    from sbs_sim.nodes.recorder import Recorder
+    from sbs_sim.nodes.flight_log import FlightLog
 
     aircraft = Aircraft.load("sbs")
     point = trim(aircraft)
-    Recorder(
+    FlightLog(
         str(tmp_path / "a.mcap"), Simulation(aircraft, trimmed_state(aircraft, point), point.swashplate), {}
     ).close()
     found = replay("--verify", tmp_path / "a.mcap")
@@ -300,7 +302,7 @@ def test_a_log_of_another_writer_is_played(tmp_path):
     from mcap.writer import Writer
     from rclpy.serialization import serialize_message
 
-    from sbs_sim.nodes.recorder import definition_file
+    from sbs_sim.nodes.message_types import definition_file
     from sbs_sim.recording import message_definition
 
     def publish(writer, topic, type_name, encoding, definition, data):
@@ -344,7 +346,7 @@ def test_messages_that_are_none_are_left_out_and_all_others_are_played(tmp_path)
     """Too short, of lengths that cannot be, or refused by ROS: one line for each topic, and the exit code."""
     from mcap.writer import Writer
 
-    from sbs_sim.nodes.recorder import definition_file
+    from sbs_sim.nodes.message_types import definition_file
     from sbs_sim.recording import message_definition
 
     def number(i):
@@ -395,7 +397,7 @@ def test_two_flights_in_one_file_are_told_and_can_be_chosen(tmp_path, recorded):
     heavy, both = tmp_path / "heavy.mcap", tmp_path / "both.mcap"
     fly_with(flight_of(read(recorded)), ["body.mass=23"], 10**6, heavy)
     merge(both, recorded, heavy)
-    titles = [f"{number} is /state begun {wall}" for number, wall in enumerate(map(begin, (recorded, heavy)), 1)]
+    titles = [f"{number} is /state started {wall}" for number, wall in enumerate(map(begin, (recorded, heavy)), 1)]
     found = replay(both, domain=next(DOMAINS))
     assert found.returncode == 1
     assert found.stderr == (

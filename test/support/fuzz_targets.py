@@ -28,7 +28,7 @@ from ruamel.yaml import YAML
 from sbs_sim import Aircraft, LinearModel, Simulation, linearize, simulate, sweep, trim
 from sbs_sim.analysis.batch import Case, simulate_batch
 from sbs_sim.analysis.monte_carlo import gust_cases
-from sbs_sim.cockpit.playback import Recording
+from sbs_sim.cockpit.recorded_snapshots import RecordedSnapshots
 from sbs_sim.config_file import config_folder
 from sbs_sim.errors import SbsError
 from sbs_sim.flight.mixer import Mixer
@@ -36,12 +36,13 @@ from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.model.airfoil import read_table
 from sbs_sim.model.wind import Wind
 from sbs_sim.pilot.augmentation import StickPilot, augmentation
-from sbs_sim.pilot.flight import fly
 from sbs_sim.pilot.hover_hold import LIMITS, HoverHold, HoverModel, design
 from sbs_sim.pilot.joystick import Joystick, JoystickFile
+from sbs_sim.pilot.piloted_flight import simulate_with_pilot
 from sbs_sim.recording import Log, LogWriter, qos_profiles, read, recover
-from sbs_sim.recording.flight import flight_of, verify
 from sbs_sim.recording.plot import plot
+from sbs_sim.recording.recorded_flight import flight_of
+from sbs_sim.recording.verification import verify
 
 BAG = Path(__file__).resolve().parents[2] / "bags" / "hover_step.mcap"
 COMMANDS = ("trim", "linearize", "sweep", "batch", "gusts", "plot")
@@ -485,7 +486,7 @@ def check_pilot_flight(given: dict[str, Any]) -> None:
     """A flight with a pilot who gives anything."""
     answers = iter(given["answers"])
     with refusing():
-        flight = fly(
+        flight = simulate_with_pilot(
             given["aircraft"],
             given["start"],
             lambda time, state: next(answers, HOVER.controls),
@@ -724,7 +725,7 @@ def use_log(path: Path, draw: bool) -> None:
         with refusing():
             verify(flight_of(log))
     with refusing():
-        recording = Recording(path)  # as the cockpit shows it
+        recording = RecordedSnapshots(path)  # as the cockpit shows it
         for time in (-1.0, recording.beginning, 0.5 * recording.end, 1e9):
             snapshot = recording.at(time)
             assert snapshot.loads.shape[0] == len(recording.aircraft.rotors)
@@ -995,7 +996,7 @@ TARGETS = (
     FuzzTarget("gust_cases", GUST_CASES, check_gust_cases, 1.0),
     FuzzTarget("LinearModel.save", EXPORTS, check_export, 1.0),
     FuzzTarget("hover hold, sticks", PILOTS, check_pilot, 0.5),
-    FuzzTarget("pilot.flight.fly", PILOT_FLIGHTS, check_pilot_flight, 1.0),
+    FuzzTarget("pilot.piloted_flight.simulate_with_pilot", PILOT_FLIGHTS, check_pilot_flight, 1.0),
     FuzzTarget("joystick file, axes", JOYSTICKS, check_joystick, 2.0),
     FuzzTarget("aircraft file, bytes", mutated(YAML_TEXTS, PIECES), check_yaml, 2.0),
     FuzzTarget("aircraft file, values", st.lists(st.tuples(PATHS, ANYTHING), max_size=3), check_yaml_values, 2.0),

@@ -26,7 +26,8 @@ from sbs_msgs.msg import (
     SimulationStatus,
 )
 from sbs_sim.recording import read
-from sbs_sim.recording.flight import flight_of, verify
+from sbs_sim.recording.recorded_flight import flight_of
+from sbs_sim.recording.verification import verify
 
 DEGREE = math.radians(1.0)
 HOVER_STEP = Path(__file__).resolve().parents[2] / "bags" / "hover_step.mcap"

@@ -26,7 +26,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from sbs_msgs.msg import Controls, Swashplate, SwashplateArray
 from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
-from sbs_sim.nodes.host import keep_to_this_machine
+from sbs_sim.nodes.confinement import keep_to_this_machine
 
 EXECUTABLES = Path(__file__).resolve().parents[2] / "install" / "sbs_sim" / "lib" / "sbs_sim"
 LAST_DOMAIN = 101  # the ports of later ones are those that Linux gives to anybody

@@ -25,7 +25,10 @@ import numpy as np
 
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording import Log, LogWriter, Recovery, qos_profiles, read, recover
-from sbs_sim.recording.scan import Content, Source, read_summary, scan
+from sbs_sim.recording.checked_records import Content
+from sbs_sim.recording.scan import scan
+from sbs_sim.recording.source import Source
+from sbs_sim.recording.summary import read_summary
 
 SCHEMA = "# Time of the message [ns].\nuint64 sent\n\n# Anything [-].\nfloat64[] values\n"
 LENGTHS = (16, 72, 8, 88, 7, 0)  # numbers in the messages of six topics, about the simulator's

@@ -42,9 +42,9 @@ from sbs_sim import Aircraft, trim  # noqa: E402
 PARTS = ("simulator", "control_mixer", "analysis", "hover_hold")
 # What the others say in their diagnostics when a part is gone; nobody needs the analysis to fly.
 MISSED = {
-    "control_mixer": ("simulator", "nobody publishes swashplate any more"),
-    "hover_hold": ("control_mixer", "nobody publishes controls any more"),
-    "simulator": ("control_mixer", "no simulator: nobody publishes /clock"),
+    "control_mixer": ("simulator", "swashplate has lost its publisher"),
+    "hover_hold": ("control_mixer", "controls has lost its publisher"),
+    "simulator": ("control_mixer", "no simulator: no node publishes /clock"),
 }
 LEASE = 40.0  # s: DDS takes 20 to miss somebody who left without a word
 PACE = 0.97  # real-time factor that counts as real time

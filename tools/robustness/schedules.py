@@ -35,13 +35,16 @@ from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.ground import lowest_point
 from sbs_sim.model.wind import Wind
-from sbs_sim.nodes.arrivals import Arrivals
+from sbs_sim.nodes.command_monitor import CommandMonitor
+from sbs_sim.nodes.component import Component
+from sbs_sim.nodes.confinement import keep_to_this_machine
 from sbs_sim.nodes.conversions import swashplate_messages
-from sbs_sim.nodes.host import COMMAND_QOS, Component, keep_to_this_machine
-from sbs_sim.nodes.outputs import Outputs
-from sbs_sim.nodes.recording import Recording
+from sbs_sim.nodes.qos import COMMAND_QOS
+from sbs_sim.nodes.recorder_node import RecorderNode
+from sbs_sim.nodes.simulator_outputs import SimulatorOutputs
 from sbs_sim.recording import read
-from sbs_sim.recording.flight import flight_of, verify
+from sbs_sim.recording.recorded_flight import flight_of
+from sbs_sim.recording.verification import verify
 from sbs_sim.terminal.progress import progress_bar
 
 GROUND = -4.0  # m
@@ -80,9 +83,9 @@ class Flight:
         )
         self.loop = FlightLoop(self._simulation, real_time_factor=0.0)
         self._node = Component(f"simulator_{number}")
-        self._log = Recording(self._simulation, self.loop, {"number": number})
-        self._arrivals = Arrivals(self._node, SwashplateArray, "swashplate", COMMAND_QOS, self._log)
-        self._outputs = Outputs(self._node, self.loop, self._arrivals, self._log)
+        self._log = RecorderNode(self._simulation, self.loop, {"number": number})
+        self._arrivals = CommandMonitor(self._node, SwashplateArray, "swashplate", COMMAND_QOS, self._log)
+        self._outputs = SimulatorOutputs(self._node, self.loop, self._arrivals, self._log)
 
     @contextlib.contextmanager
     def flying(self, recorded: bool) -> Iterator[None]:

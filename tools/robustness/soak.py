@@ -37,9 +37,10 @@ from sbs_msgs.srv import Linearize, Record, Reset, SetWind, Step, Trim  # noqa: 
 from sbs_sim import Aircraft  # noqa: E402
 from sbs_sim.errors import SbsError  # noqa: E402
 from sbs_sim.model.frames import quaternion_to_euler  # noqa: E402
-from sbs_sim.nodes.host import SERVICE_QOS  # noqa: E402
+from sbs_sim.nodes.qos import SERVICE_QOS  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
-from sbs_sim.recording.flight import flight_of, verify  # noqa: E402
+from sbs_sim.recording.recorded_flight import flight_of  # noqa: E402
+from sbs_sim.recording.verification import verify  # noqa: E402
 
 TURBULENCE = Vector3(x=1.5, y=1.5, z=0.8)  # m/s, moderate air near the ground
 WARM = 0.2  # share of the time after which the memory must not grow any more

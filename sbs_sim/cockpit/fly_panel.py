@@ -1,10 +1,9 @@
-"""The controls of the page: sliders, buttons, keys. What they do is done by a `Pilot`."""
+"""Panel of the live flight: sliders, buttons and keys, which act through a `Pilot`."""
 
 import math
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,21 +11,18 @@ from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
+from sbs_sim.cockpit.panel_tools import REAL_TIME_FACTORS, Answer, by_user, notify
 from sbs_sim.cockpit.readouts import condition_here
-from sbs_sim.cockpit.told import Trimmed, line, model_page, trim_page
+from sbs_sim.cockpit.trim_report import TrimResult, line, model_page, trim_page
 from sbs_sim.errors import SbsError
 from sbs_sim.flight.records import Snapshot
 from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model.state import CONTROL_NAMES
 
 Array = NDArray[np.float64]
-Answer = tuple[bool, str]  # whether it was done, and what is to be said
 
 SLIDER_STEP, KEY_STEP = 0.02, 0.1  # deg
-PLACE_STEP = 0.01  # s
 OLD_STATUS, OLDEST_STATUS = 0.5, 5.0  # s in which a status may still be one from before an answer; on a busy machine
-NOTICE = 8.0  # s that a notice is shown
-PACES = ("0.01", "0.05", "0.1", "0.25", "0.5", "1", "2", "as fast as possible")
 LABELS = ("Collective", "Lateral", "Longitudinal", "Differential")
 # Two keys of each stick, with what they do to any aircraft; they lie together, apart from those that move the camera.
 KEYS = (
@@ -36,7 +32,6 @@ KEYS = (
     (("O", "Nose right"), ("U", "Nose left")),
 )
 UNKNOWN = "what more of it does to this aircraft is not known, for it has no hover"
-LIVE, NOTHING = "live", "choose a log"
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
 RECORD, END_RECORD = "Record", "End recording"
 TRIM, LINEARIZE = "Trim here", "Linearize here"
@@ -50,7 +45,6 @@ FIRST_HINT = (
 )
 LOG_SHOWN = "A log is shown: nothing here steers the live flight meanwhile."
 GONE = "The simulator is gone."
-FLIES_ALONE = "Keys of the controls fly a live flight, not a log."
 
 
 class Pilot(Protocol):
@@ -80,27 +74,11 @@ class Pilot(Protocol):
     def record(self, on: bool) -> Answer:
         """Begin a log in the default folder, or end the present one."""
 
-    def trim(self, condition: TrimCondition) -> tuple[Trimmed | None, str]:
+    def trim(self, condition: TrimCondition) -> tuple[TrimResult | None, str]:
         """Trim a condition; or why there is no trim."""
 
-    def linearize(self, condition: TrimCondition) -> tuple[Trimmed | None, str]:
+    def linearize(self, condition: TrimCondition) -> tuple[TrimResult | None, str]:
         """Linearize about a condition: its trim, or why there is none; the model comes by itself."""
-
-
-def _by_user(act: Callable[[], None]) -> Callable[[Any], None]:
-    """Callback that acts on what a user did, not on values that the program sets."""
-
-    def callback(event: Any) -> None:
-        if event.client is not None:
-            act()
-
-    return callback
-
-
-def _notify(server: ViserServer, title: str, text: str) -> None:
-    """Tell everyone who looks at the page what was refused."""
-    for client in server.get_clients().values():
-        client.add_notification(title, text, color="orange", auto_close_seconds=NOTICE)
 
 
 class FlyPanel:
@@ -178,8 +156,8 @@ class FlyPanel:
         gui = self._server.gui
         self._clock = gui.add_button_group("Flight", (PAUSE, STEP, RESET))
         self._clock.on_click(lambda event: self._on_clock(event.target.value))
-        self._pace = gui.add_dropdown("Real time ×", PACES, initial_value="1")
-        self._pace.on_update(_by_user(self._on_pace))
+        self._pace = gui.add_dropdown("Real time ×", REAL_TIME_FACTORS, initial_value="1")
+        self._pace.on_update(by_user(self._on_pace))
 
     def _add_disturbances(self) -> None:
         gui = self._server.gui
@@ -205,10 +183,10 @@ class FlyPanel:
                 (less, _), (more, _) = KEYS[i]
                 hint = f"{self._words[i]}. Keys {less}, {more}"
                 slider = gui.add_slider(label, low, high, SLIDER_STEP, start, hint=hint, marks=marks)
-                slider.on_update(_by_user(self._on_slider))
+                slider.on_update(by_user(self._on_slider))
                 self.sliders.append(slider)
             self._hold = gui.add_checkbox("Hold", False, hint="the page keeps commanding; untick to let others fly")
-            self._hold.on_update(_by_user(self._on_hold))
+            self._hold.on_update(by_user(self._on_hold))
 
     def _add_reset(self) -> None:
         gui = self._server.gui
@@ -243,7 +221,7 @@ class FlyPanel:
         """Tell what was refused."""
         done, message = answer
         if not done:
-            _notify(self._server, f"{what} refused", message)
+            notify(self._server, f"{what} refused", message)
 
     def go(self) -> None:
         """Pause or go on."""
@@ -318,13 +296,13 @@ class FlyPanel:
 
     def _show_pace(self, pace: float) -> None:
         """Choose the real-time factor that is in force; one that the page does not offer joins the others."""
-        name = PACES[-1] if pace == 0.0 else f"{pace:g}"
-        self._pace.options = PACES if name in PACES else (name, *PACES)
+        name = REAL_TIME_FACTORS[-1] if pace == 0.0 else f"{pace:g}"
+        self._pace.options = REAL_TIME_FACTORS if name in REAL_TIME_FACTORS else (name, *REAL_TIME_FACTORS)
         self._pace.value = name
 
     def _on_pace(self) -> None:
         if self._pace.value in self._pace.options and self._steerable:
-            factor = 0.0 if self._pace.value == PACES[-1] else float(self._pace.value)
+            factor = 0.0 if self._pace.value == REAL_TIME_FACTORS[-1] else float(self._pace.value)
             self._say("Real-time factor", self._pilot.set_pace(factor))
 
     def _on_slider(self) -> None:
@@ -375,7 +353,7 @@ class FlyPanel:
     # ------------------------------------------------------------------------------------------------------ update
 
     def show_wind(self, velocity: Array, turbulence: float) -> None:
-        """The wind that somebody has set: steady, NED [m/s], shape (3,), and the largest part of its turbulence."""
+        """The wind that was set: steady, NED [m/s], shape (3,), and the largest part of its turbulence."""
         for number, value in zip(self._wind, velocity, strict=True):
             number.value = round(float(value), 3)
         self._turbulence.value = round(turbulence, 3)
@@ -403,117 +381,3 @@ class FlyPanel:
             rounded = round(float(value), 3)
             if not abs(slider.value - rounded) <= 0.5 * SLIDER_STEP:  # true for a NaN as well
                 slider.value = rounded
-
-
-class LogPanel:
-    """Choice of a log, and its playing.
-
-    Parameters
-    ----------
-    server : ViserServer
-    list_logs : callable
-        Paths that can be chosen.
-    choose : callable
-        Takes a path, or None for the live flight; what to say if it cannot be shown.
-    """
-
-    def __init__(
-        self,
-        server: ViserServer,
-        list_logs: Callable[[], Sequence[Path]],
-        choose: Callable[[Path | None], Answer],
-    ) -> None:
-        self._server, self._list, self._choose = server, list_logs, choose
-        self._first = NOTHING
-        self._paths: dict[str, Path] = {}
-        gui = server.gui
-        self._pick = gui.add_dropdown("Source", [self._first, *self._names()])
-        self._pick.on_update(_by_user(self._on_pick))
-        gui.add_button("Look for new logs").on_click(lambda _: self._refresh())
-        self._times = np.zeros(1)
-        self.playing = gui.add_checkbox("Play", True)
-        self.rate = gui.add_dropdown("Speed ×", PACES[:-1], initial_value="1")
-        self.place = gui.add_slider("Time [s]", 0.0, 1.0, PLACE_STEP, 0.0)
-        self._told = -math.inf
-        self.moved = False
-        self.place.on_update(_by_user(self._on_place))
-        self.message = gui.add_html("")
-        self.enable(None)
-
-    def _names(self) -> list[str]:
-        self._paths = {path.name: path for path in self._list()}
-        return list(self._paths)
-
-    def _refresh(self) -> None:
-        chosen = self._pick.value
-        self._pick.options = (self._first, *self._names())
-        if chosen in self._pick.options:
-            self._pick.value = chosen
-
-    def offer_live(self, chosen: bool) -> None:
-        """Offer a live flight, and say that it is shown if it is."""
-        if self._first != LIVE:
-            self._first = LIVE
-            self._refresh()
-        if chosen:
-            self._pick.value = LIVE
-
-    def _on_pick(self) -> None:
-        done, message = self._choose(self._paths.get(self._pick.value))
-        self.message.content = line(message)
-        if not done:
-            _notify(self._server, "Log refused", message)
-
-    def _on_place(self) -> None:
-        self.moved = math.isfinite(self.place.value)
-
-    @property
-    def speed(self) -> float:
-        """Recorded time over wall time; 1 for what is none of those to choose from."""
-        return float(self.rate.value) if self.rate.value in PACES[:-1] else 1.0
-
-    def enable(self, times: Array | None) -> None:
-        """Offer the controls of a log with instants [s], or of none."""
-        for handle in (self.playing, self.rate, self.place):
-            handle.disabled = times is None
-        if times is not None:
-            self._times = times
-            self.place.min, self.place.max = float(times[0]), max(float(times[-1]), float(times[0]) + 0.01)
-            self.playing.value = True
-
-    def _move(self, place: float) -> None:
-        """Go to a time [s]."""
-        self.place.value = place
-        self.moved = True
-
-    def go(self) -> None:
-        """Pause or go on; from the beginning where the end is reached."""
-        at_end = self.place.value >= self._times[-1] - PLACE_STEP
-        if at_end:
-            self._move(float(self._times[0]))
-        self.playing.value = at_end or not self.playing.value
-
-    def step(self) -> None:
-        """Go to the next instant."""
-        self.playing.value = False
-        after = self._times[self._times > self.place.value + 0.5 * PLACE_STEP]
-        self._move(float(after[0]) if len(after) else float(self._times[-1]))
-
-    def restart(self) -> None:
-        """Go to the beginning."""
-        self._move(float(self._times[0]))
-
-    def press(self, key: str) -> None:
-        """Nothing: a log is flown."""
-        self._say_once(FLIES_ALONE)
-
-    def doublet(self) -> None:
-        """Nothing: a log is flown."""
-        self._say_once(FLIES_ALONE)
-
-    def _say_once(self, text: str) -> None:
-        """Notify, but not at every key."""
-        now = time.monotonic()
-        if now - self._told > NOTICE:
-            self._told = now
-            _notify(self._server, "Not flown", text)

@@ -22,10 +22,10 @@ from sbs_sim.model.wind import Wind
 
 Array = NDArray[np.float64]
 
-MOST_DELAY = 100  # ticks
+MAX_DELAY = 100  # ticks
 
 
-def fly(
+def simulate_with_pilot(
     aircraft: Aircraft,
     start: TrimPoint | ArrayLike,
     pilot: Callable[[float, Array], ArrayLike],
@@ -67,7 +67,7 @@ def fly(
         See `Simulation`, `Mixer.set_target`.
     """
     checks.instance("aircraft", aircraft, Aircraft, PilotError)
-    delay = checks.whole("delay", delay, 0, MOST_DELAY, PilotError)
+    delay = checks.whole("delay", delay, 0, MAX_DELAY, PilotError)
     duration = checks.number("duration", duration, 0.0, 1e6, "s", PilotError)
     if not callable(pilot):
         raise PilotError(f"pilot = {checks.shown(pilot)}: allowed are functions of time and state")

@@ -19,6 +19,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from sbs_sim.errors import RecordingError
+from sbs_sim.recording.flight_topics import wall_clock
 from sbs_sim.recording.mcap_file import (
     CHECKSUM,
     DISTRO,
@@ -32,13 +33,12 @@ from sbs_sim.recording.mcap_file import (
     Message,
     NewFile,
 )
-from sbs_sim.recording.roles import wall_clock
 
 FLUSH_PERIOD = 0.2  # s of wall time between chunks
 CHUNK_SIZE = 256 * 1024  # bytes of messages at which a chunk is closed before that
 QUEUE_LENGTH = 10_000  # messages that wait for the disk: 15 s of flight
-LARGEST_ATTACHMENT = 1 << 27  # bytes
-LATEST_TIME = 2**63  # ns; MCAP could hold twice that, most readers cannot
+MAX_ATTACHMENT_SIZE = 1 << 27  # bytes
+MAX_TIME = 2**63  # ns; MCAP could hold twice that, most readers cannot
 END = "recording_end"  # metadata records of our own
 RESERVED = (START, END, RECOVERY, ROSBAG2)
 RESERVED_KEYS = (CHECKSUM, RECORDING_ID)
@@ -69,7 +69,7 @@ class LogWriter:
     path : Path
         Where it is: a file that is given another name meanwhile is followed.
     recording_id : str
-        Of this recording alone; its topics and metadata have it, so that they are told from those of others in a file
+        Of this recording alone; its topics and metadata have it, so that they differ from those of others in a file
         that was made of several.
     written : int
         Messages that are safe with the operating system.
@@ -135,10 +135,10 @@ class LogWriter:
         pieces = [self._builder.start(library), self._metadata(START, start)]
         pieces += [self._metadata(name, data) for name, data in metadata.items()]
         for name, content in attachments.items():
-            if MAGIC in content:  # in a damaged file its chunks could not be told from ours
+            if MAGIC in content:  # in a damaged file its chunks could not be distinguished from its own
                 raise RecordingError(f"attachment {name!r} is a recording itself, which cannot be attached")
-            if len(content) > LARGEST_ATTACHMENT:
-                raise RecordingError(f"attachment {name!r} has {len(content)} bytes: allowed are {LARGEST_ATTACHMENT}")
+            if len(content) > MAX_ATTACHMENT_SIZE:
+                raise RecordingError(f"attachment {name!r} has {len(content)} bytes: allowed are {MAX_ATTACHMENT_SIZE}")
             attachment = Attachment(
                 create_time=wall_start, log_time=0, name=name, media_type="application/octet-stream", data=content
             )
@@ -210,7 +210,7 @@ class LogWriter:
         return number
 
     def write(self, channel: int, log_time_ns: int, data: bytes, wait: bool = False, essential: bool = False) -> bool:
-        """Take a message; false if it is dropped. Costs about a microsecond and never waits, unless told to.
+        """Take a message; false if it is dropped. Costs about a microsecond and never waits, unless `wait`.
 
         Parameters
         ----------
@@ -230,7 +230,7 @@ class LogWriter:
         RecordingError
             An unknown channel, or a time that no recording can hold.
         """
-        if not 0 <= log_time_ns < LATEST_TIME:
+        if not 0 <= log_time_ns < MAX_TIME:
             raise RecordingError(f"log time {log_time_ns} ns: allowed are 0 to 2^63 - 1")
         limit = self._queue_length * (2 if essential else 1)
         with self._lock:
@@ -284,7 +284,7 @@ class LogWriter:
     def _run(self) -> None:
         try:
             while (batch := self._next_batch()) is not None:
-                self._file.look()
+                self._file.check_file()
                 for part in _parts(batch):
                     self._file.write(self._builder.chunk(part))
                     self._in_hand -= len(part)
@@ -292,11 +292,11 @@ class LogWriter:
             counts = {"written": str(self.written), "dropped": str(self.dropped)}
             end = self._metadata(END, counts)
             self._file.write(end + self._builder.finish(self.path.name, counts, self._distro))
-            self._file.look()
+            self._file.check_file()
             self._file.close()
         except RecordingError as error:
             self._fail(str(error))
-        except Exception as error:  # an error of ours must not end the flight, nor go unnoticed
+        except Exception as error:  # an internal error must not end the flight, nor go unnoticed
             self._fail(f"cannot write {self.path}: internal error: {error!r}")
 
     def _next_batch(self) -> list[Message] | None:

@@ -1,6 +1,6 @@
 """The log of a flight: everything that the nodes of a process publish or accept, into one MCAP file.
 
-Not a node: messages come serialised from the publishers (`sbs_sim.nodes.host.Topic`), so recording costs a queue.
+The publishers (`sbs_sim.nodes.recorded_publisher`) serialise each message once. Recording one puts it into a queue.
 """
 
 import datetime
@@ -11,21 +11,22 @@ import re
 from pathlib import Path
 from typing import Any
 
-from ament_index_python.packages import get_package_share_directory
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 
 from sbs_sim.errors import RecordingError
 from sbs_sim.flight.simulation import Simulation
-from sbs_sim.recording import LogWriter, message_definition, qos_profiles, type_hash
-from sbs_sim.recording.flight import attachments, simulation_metadata
+from sbs_sim.nodes.message_types import definition_file
+from sbs_sim.nodes.recorded_qos import offered
+from sbs_sim.recording import LogWriter, message_definition, type_hash
+from sbs_sim.recording.flight_metadata import attachments, simulation_metadata
 from sbs_sim.versions import surroundings, versions
 
-LONGEST_NAME = 60  # characters of the aircraft's that go into the file's
+MAX_NAME_LENGTH = 60  # characters of the aircraft's that go into the file's
 RCLPY_OF = {"3": "humble", "4": "iron", "7": "jazzy", "9": "kilted"}  # distributions by the first number of its version
-CLOSING_TIME = 10.0  # s to get the rest of a log onto the disk
+CLOSING_TIMEOUT = 10.0  # s to get the rest of a log onto the disk
 
 
-class Recorder:
+class FlightLog:
     """Writes the log of one flight.
 
     Parameters
@@ -99,11 +100,11 @@ class Recorder:
 
     def close(self) -> None:
         """Write the rest and end the file."""
-        self._writer.close(CLOSING_TIME)
+        self._writer.close(CLOSING_TIMEOUT)
 
     def discard(self) -> None:
         """End the file and delete it."""
-        self._writer.discard(CLOSING_TIME)
+        self._writer.discard(CLOSING_TIMEOUT)
 
 
 def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
@@ -121,22 +122,11 @@ def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(f"{folder}: {error.strerror}") from None
-    # the name comes from a file that somebody else may have written: it must not lead out of the folder
-    safe = re.sub(r"[^\w.-]+", "_", aircraft)[:LONGEST_NAME]
+    # the name comes from a file of unknown origin: it must not lead out of the folder
+    safe = re.sub(r"[^\w.-]+", "_", aircraft)[:MAX_NAME_LENGTH]
     name = f"{begin:%Y-%m-%d_%H-%M-%S}_{safe}"
     others = (folder / f"{name}_{number}.mcap" for number in itertools.count(2))  # of the same second
     return next(path for path in itertools.chain([folder / f"{name}.mcap"], others) if not os.path.lexists(path))
-
-
-def definition_file(package: str, place: str) -> Path:
-    """Path of an installed interface definition.
-
-    Raises
-    ------
-    LookupError
-        The package is not installed.
-    """
-    return Path(get_package_share_directory(package)) / place
 
 
 def ros_distro() -> str:
@@ -151,13 +141,3 @@ def ros_distro() -> str:
     except importlib.metadata.PackageNotFoundError:
         return ""
     return RCLPY_OF.get(version.split(".")[0], "")
-
-
-def offered(qos: QoSProfile) -> str:
-    """Quality of service as a log holds it."""
-    return qos_profiles(
-        "reliable" if qos.reliability == ReliabilityPolicy.RELIABLE else "best_effort",
-        "transient_local" if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL else "volatile",
-        "keep_all" if qos.history == HistoryPolicy.KEEP_ALL else "keep_last",
-        qos.depth,
-    )

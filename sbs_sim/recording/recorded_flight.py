@@ -1,49 +1,39 @@
-"""What a log of ours says of a flight: aircraft, options, events, states; and the flight flown again from them."""
+"""Recorded flight of a log: its aircraft, options, events and states."""
 
-import io
-import itertools
 import math
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from ruamel.yaml import YAML
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.content import ByContent
 from sbs_sim.errors import RecordingError
-from sbs_sim.flight.records import Event, Snapshot
-from sbs_sim.flight.refly import refly
-from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.records import Event
 from sbs_sim.model.wind import Wind
+from sbs_sim.recording.flight_metadata import AIRCRAFT_FILE, AIRFOIL_FOLDER
+from sbs_sim.recording.flight_topics import alike
 from sbs_sim.recording.log import Log, Topic
 from sbs_sim.recording.mcap_file import RECOVERY
-from sbs_sim.recording.roles import alike
-from sbs_sim.versions import differences
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-AIRCRAFT_FILE = "aircraft.yaml"
-AIRFOIL_FOLDER = "airfoils"
 OPTIONS = {"tick": float, "azimuth_step": float, "lead_lag": bool, "cyclic_inflow": bool, "method": str}
 GROUND = "ground_altitude"  # an option too; older logs have none
 WIND_VECTORS = ("velocity", "gust", "turbulence_intensity")
 WIND_NUMBERS = ("gust_delay", "gust_duration", "turbulence_length", "turbulence_airspeed", "turbulence_direction")
-# Another version of the model may round otherwise, and the rotors' fast modes carry that along: what may then differ,
-# relative to the largest magnitude of each state in the flight. Another processor or compilation rounds alike.
-TOLERANCE = 1e-6
-LATEST_STATE = 10**17  # ns, three years of flight
-LONGEST_GAP = 1e4  # s without a state; to fly through a damaged time would take for ever
+MAX_STATE_TIME = 10**17  # ns, three years of flight
+MAX_STATE_GAP = 1e4  # s without a state; to fly through a damaged time would take for ever
 
 
 @dataclass(frozen=True, eq=False)
-class Flight(ByContent):
+class RecordedFlight(ByContent):
     """A recorded flight.
 
     Attributes
@@ -78,79 +68,7 @@ class Flight(ByContent):
     folder: "tempfile.TemporaryDirectory[str]" = field(repr=False, compare=False)
 
 
-@dataclass(frozen=True)
-class Difference:
-    """One state of one step that did not come again."""
-
-    step: int
-    time: float
-    state: str
-    logged: float
-    flown: float
-    relative: float  # to the largest magnitude of this state in the flight
-
-
-@dataclass(frozen=True)
-class Verification:
-    """Result of flying a log again.
-
-    Attributes
-    ----------
-    states : int
-        Recorded states that were compared.
-    first, largest : Difference or None
-        None if every bit is the same.
-    other_versions : dict of str to (str, str)
-        What differs between the log and this machine: recorded, here.
-    """
-
-    states: int
-    first: Difference | None
-    largest: Difference | None
-    other_versions: dict[str, tuple[str, str]] = field(default_factory=dict)
-
-    @property
-    def within_tolerance(self) -> bool:
-        """True if no state differs by more than what other rounding may do."""
-        return self.largest is None or self.largest.relative <= TOLERANCE
-
-    @property
-    def identical(self) -> bool:
-        """True if every bit of every state is the same."""
-        return self.first is None
-
-    @property
-    def passed(self) -> bool:
-        """True if it is as it should be: identical, or within the tolerance where versions are other ones."""
-        return self.identical or (bool(self.other_versions) and self.within_tolerance)
-
-
-# --- what goes into a log ---------------------------------------------------------------------------------------
-
-
-def simulation_metadata(simulation: Simulation) -> dict[str, str]:
-    """Options of a simulation as text that gives back their bits."""
-    return {
-        "aircraft": simulation.aircraft.name,
-        "parameter_hash": simulation.aircraft.parameter_hash,
-        **{name: str(value) for name, value in simulation.options.items()},
-        "step_size": repr(simulation.step_size),
-        "steps_per_tick": repr(simulation.steps_per_tick),
-    }
-
-
-def attachments(aircraft: Aircraft) -> dict[str, bytes]:
-    """The aircraft as files: its own and those of its airfoils."""
-    data, files = aircraft.files()
-    text = io.BytesIO()
-    YAML(typ="safe", pure=True).dump(data, text)
-    return {AIRCRAFT_FILE: text.getvalue(), **{f"{AIRFOIL_FOLDER}/{name}": content for name, content in files.items()}}
-
-
-# --- what comes out of it ---------------------------------------------------------------------------------------
-
-
-def flight_of(log: Log) -> Flight:
+def flight_of(log: Log) -> RecordedFlight:
     """Flight that a log holds.
 
     Raises
@@ -176,18 +94,18 @@ def flight_of(log: Log) -> Flight:
         if not len(steps):
             raise RecordingError("the log holds no states")
         events = _events(log, aircraft)
-        if np.diff(steps, prepend=events[0].step).max() * step_size > LONGEST_GAP:
-            raise RecordingError(f"the log has no states for more than {LONGEST_GAP:g} s of its flight")
+        if np.diff(steps, prepend=events[0].step).max() * step_size > MAX_STATE_GAP:
+            raise RecordingError(f"the log has no states for more than {MAX_STATE_GAP:g} s of its flight")
         options = {name: _option(simulation[name], kind) for name, kind in OPTIONS.items()}
         options[GROUND] = float(simulation.get(GROUND, "-inf"))
-        return Flight(aircraft, options, events, steps, states, step_size, dict(recorded), log.roles, folder)
+        return RecordedFlight(aircraft, options, events, steps, states, step_size, dict(recorded), log.roles, folder)
     except KeyError as error:
         raise RecordingError(f"the log holds no flight of sbs_sim: {error.args[0]} is missing") from None
     except (ValueError, IndexError, TypeError, OverflowError) as error:  # of our names, but with other contents
-        raise RecordingError(f"the flight in the log makes no sense: {' '.join(str(error).split())}") from None
+        raise RecordingError(f"the flight in the log is invalid: {' '.join(str(error).split())}") from None
 
 
-def whole_until(log: Log) -> float:
+def complete_until(log: Log) -> float:
     """Time up to which the log holds every command of its flight [s]; infinite if it holds all that were recorded.
 
     The messages of a topic are numbered. Events that are missing between others are found by that; some that are
@@ -262,22 +180,22 @@ def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, A
     """Simulation states where all three topics that make them up were recorded."""
     body, rotors, inflow = log["state"], log["rotors"], log["inflow"]
     for topic in (body, rotors, inflow):
-        if np.abs(topic.time_ns).max(initial=0) > LATEST_STATE:
-            raise RecordingError(f"topic {topic.name} has a time of more than {LATEST_STATE * 1e-9:g} s")
+        if np.abs(topic.time_ns).max(initial=0) > MAX_STATE_TIME:
+            raise RecordingError(f"topic {topic.name} has a time of more than {MAX_STATE_TIME * 1e-9:g} s")
     where = _together(body, rotors, inflow)
     times = body.time_ns[where[0]]
     layout = aircraft.layout
     states = np.zeros((len(times), layout.size))
     fields = [f"position.{axis}" for axis in "xyz"] + [f"attitude.{axis}" for axis in "wxyz"]
     fields += [f"velocity.{axis}" for axis in "xyz"] + [f"angular_velocity.{axis}" for axis in "xyz"]
-    for place, name in enumerate(fields):
-        states[:, place] = body[name][where[0]]
+    for index, name in enumerate(fields):
+        states[:, index] = body[name][where[0]]
     for j in range(len(aircraft.rotors)):
         parts = {"flap": layout.flap, "flap_rate": layout.flap_rate, "lag": layout.lag, "lag_rate": layout.lag_rate}
-        for name, place_of in parts.items():
-            states[:, place_of(j)] = rotors[f"rotors[{j}].{name}"][where[1]]
-        for place, name in enumerate(("uniform", "sine", "cosine"), layout.inflow(j).start):
-            states[:, place] = inflow[f"rotors[{j}].{name}"][where[2]]
+        for name, slice_of in parts.items():
+            states[:, slice_of(j)] = rotors[f"rotors[{j}].{name}"][where[1]]
+        for index, name in enumerate(("uniform", "sine", "cosine"), layout.inflow(j).start):
+            states[:, index] = inflow[f"rotors[{j}].{name}"][where[2]]
     return np.round(times * 1e-9 / step_size).astype(np.int64), states
 
 
@@ -285,80 +203,18 @@ def _together(*topics: Topic) -> list[IntArray]:
     """Where each topic has the messages of the snapshots that all of them have, in the order of time.
 
     An instant comes several times where there was a reset. In our logs the topics are numbered alike. Where the numbers
-    are those of somebody else, messages of one time belong together in their order, if no topic lacks one.
+    are those of another program, messages of one time belong together in their order, if no topic lacks one.
     """
     common = topics[0].sequence
     for topic in topics[1:]:
         common = np.intersect1d(common, topic.sequence)
     if all((np.diff(topic.sequence) > 0).all() for topic in topics):
-        places = [np.searchsorted(topic.sequence, common) for topic in topics]
-        first, *others = (topic.time_ns[place] for topic, place in zip(topics, places, strict=True))
+        indices = [np.searchsorted(topic.sequence, common) for topic in topics]
+        first, *others = (topic.time_ns[index] for topic, index in zip(topics, indices, strict=True))
         if len(common) and all((other == first).all() for other in others) and (np.diff(first) >= 0).all():
-            return places
+            return indices
     times = np.unique(np.concatenate([topic.time_ns for topic in topics]))
     counts = [np.bincount(np.searchsorted(times, topic.time_ns), minlength=len(times)) for topic in topics]
-    whole = times[np.all([count == counts[0] for count in counts], axis=0)]
+    complete = times[np.all([count == counts[0] for count in counts], axis=0)]
     orders = [np.argsort(topic.time_ns, kind="stable") for topic in topics]
-    return [order[np.isin(topic.time_ns[order], whole)] for topic, order in zip(topics, orders, strict=True)]
-
-
-# --- flown again ------------------------------------------------------------------------------------------------
-
-
-def verify(flight: Flight, progress: Callable[[float, float], None] | None = None) -> Verification:
-    """Fly a recorded flight again and compare every recorded state, bit for bit.
-
-    Parameters
-    ----------
-    flight : Flight
-    progress : callable, optional
-        Called with the number of states that have been compared and of all of them.
-
-    Raises
-    ------
-    SbsError
-        The flight cannot be flown from what the log holds.
-    """
-    first: Difference | None = None
-    largest: Difference | None = None
-    scale = np.maximum(np.abs(flight.states).max(axis=0), 1e-12)
-    again = refly(flight.aircraft, flight.events, int(flight.steps[-1]), **flight.options)
-    for i, flown in _beside(flight, again, scale):
-        if progress is not None:
-            progress(i + 1, len(flight.states))
-        logged = flight.states[i]
-        if logged.tobytes() == flown.state.tobytes():
-            continue
-        distance = np.abs(logged - flown.state) / scale
-        place = int(np.argmax(distance))
-        found = Difference(
-            flown.step,
-            flown.time,
-            flight.aircraft.layout.names[place],
-            float(logged[place]),
-            float(flown.state[place]),
-            float(distance[place]),
-        )
-        first = first or found
-        largest = found if largest is None or found.relative > largest.relative else largest
-    return Verification(len(flight.states), first, largest, differences(flight.versions))
-
-
-def _beside(flight: Flight, flown: Iterable[Snapshot], scale: Array) -> Iterator[tuple[int, Snapshot]]:
-    """Index of each recorded state with the snapshot that was flown at its step.
-
-    Around a reset a step has several, in their order, and the nearest one is meant. A state may have been recorded
-    twice: older logs have that where a fault has ended the flight before the first step of a tick.
-    """
-    places: dict[int, list[int]] = {}
-    for i, step in enumerate(flight.steps.tolist()):
-        places.setdefault(step, []).append(i)
-    for step, group in itertools.groupby(flown, key=lambda snapshot: snapshot.step):
-        snapshots = list(group)
-        for i in places.pop(step, []):
-            if len(snapshots) > 1:
-                distances = [np.abs((found.state - flight.states[i]) / scale).max() for found in snapshots]
-                snapshots = snapshots[int(np.argmin(distances)) :]
-            yield i, snapshots[0]
-    if places:
-        raise RecordingError(f"step {min(places)} was recorded but is not flown by the events of the log")
+    return [order[np.isin(topic.time_ns[order], complete)] for topic, order in zip(topics, orders, strict=True)]

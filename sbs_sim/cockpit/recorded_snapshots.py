@@ -12,12 +12,12 @@ from sbs_sim.errors import RecordingError
 from sbs_sim.flight.records import Event, Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.recording import Log, read
-from sbs_sim.recording.flight import flight_of
+from sbs_sim.recording.recorded_flight import flight_of
 
 Array = NDArray[np.float64]
 
 
-class Recording:
+class RecordedSnapshots:
     """A log in memory.
 
     Parameters
@@ -33,7 +33,7 @@ class Recording:
     ground : float or None
         Height of the ground above the origin [m]; None if the log does not tell.
     complete : bool
-        False if the file is not whole: then there is what is.
+        False if the file is incomplete; the states then are those that it has.
 
     Raises
     ------
@@ -52,8 +52,8 @@ class Recording:
         self.times: Array = np.asarray(flight.steps * self._step_size, dtype=np.float64)
         self.ground = _finite(log.metadata["simulation"].get("ground_altitude", ""))
         self._azimuths, self._loads = _rotors(log, len(self.aircraft.rotors))
-        places = np.searchsorted(log["rotors"].time, self.times - 0.5 * self._step_size)
-        self._places = np.minimum(places, len(self._loads) - 1)
+        indices = np.searchsorted(log["rotors"].time, self.times - 0.5 * self._step_size)
+        self._indices = np.minimum(indices, len(self._loads) - 1)
         self._event_steps = [event.step for event in flight.events]
 
     @property
@@ -76,8 +76,8 @@ class Recording:
             state=self._flight.states[i],
             acceleration=np.zeros(3),
             swashplate=self._latest(step, lambda event: event.swashplate),
-            azimuth=self._azimuths[self._places[i]],
-            loads=self._loads[self._places[i]],
+            azimuth=self._azimuths[self._indices[i]],
+            loads=self._loads[self._indices[i]],
             wind=self._latest(step, lambda event: None if event.wind is None else np.array(event.wind.velocity)),
         )
 
@@ -112,7 +112,7 @@ def _rotors(log: Log, rotors: int) -> tuple[Array, Array]:
     return azimuths, loads
 
 
-def recordings(folder: Path) -> list[Path]:
+def list_logs(folder: Path) -> list[Path]:
     """Logs in a folder, latest first; none where there is no folder."""
     try:
         return sorted(folder.glob("*.mcap"), key=lambda path: path.stat().st_mtime, reverse=True)

@@ -17,7 +17,7 @@ import websockets.asyncio.server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from sbs_sim.cockpit.dress import dressed
+from sbs_sim.cockpit.page_head import with_page_head
 from sbs_sim.errors import SbsError
 
 
@@ -51,7 +51,7 @@ def _is_here(given: str, host: str) -> bool:
 
 
 @contextlib.contextmanager
-def guarded(host: str) -> Iterator[None]:
+def access_check(host: str) -> Iterator[None]:
     """Have servers of viser that are made meanwhile answer such requests with 403.
 
     Viser makes its server with `websockets.asyncio.server.serve` and leaves no other way to have a say in the opening
@@ -65,18 +65,18 @@ def guarded(host: str) -> Iterator[None]:
     serve = websockets.asyncio.server.serve
     made = []
 
-    def guard(handler: Any, *place: Any, process_request: Any, **options: Any) -> Any:
+    def guard(handler: Any, *address: Any, process_request: Any, **options: Any) -> Any:
         def check(connection: ServerConnection, request: Request) -> Response | None:
             if why := refusal(request, host):
                 return connection.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
             response: Response | None = process_request(connection, request)
             if response is not None:  # a page of others must not frame this one to have it clicked on
                 response.headers["Content-Security-Policy"] = "frame-ancestors 'self'"
-                response = dressed(response)
+                response = with_page_head(response)
             return response
 
         made.append(True)
-        return serve(handler, *place, process_request=check, **options)
+        return serve(handler, *address, process_request=check, **options)
 
     websockets.asyncio.server.serve = guard  # type: ignore[assignment, misc]
     try:

@@ -32,12 +32,12 @@ TYPES = {  # of the roles that are found by them
     "trim_point": "sbs_msgs/TrimPoint",
     "linear_model": "sbs_msgs/LinearModel",
 }
-LATEST_BEGIN = 2**62  # ns since 1970
+MAX_WALL_TIME = 2**62  # ns since 1970
 SHARED = ("clock",)  # may be one topic of several flights
 
 
 @dataclass(frozen=True)
-class Part:
+class FlightTopics:
     """The channels of one flight of a file.
 
     Attributes
@@ -61,7 +61,7 @@ class Part:
     def title(self) -> str:
         """What tells it from others: the topic of its states, and when it began."""
         begin = self.recording_id.partition("-")[0]
-        wall = f" begun {wall_clock(int(begin))}" if begin.isdecimal() and int(begin) < LATEST_BEGIN else ""
+        wall = f" started {wall_clock(int(begin))}" if begin.isdecimal() and int(begin) < MAX_WALL_TIME else ""
         return f"{self.roles[BODY][0]}{wall}"
 
 
@@ -78,7 +78,7 @@ def several(path: Path, titles: Sequence[str]) -> str:
 
 def alike(path: Path, count: int) -> str:
     """What is said of a file that others made of several older logs."""
-    return f"{path} holds {count} flights that cannot be told apart, for their logs had no identity yet"
+    return f"{path} holds {count} flights that cannot be distinguished: their logs have no identity"
 
 
 def check_flight(path: Path, number: int, count: int) -> None:
@@ -89,12 +89,12 @@ def check_flight(path: Path, number: int, count: int) -> None:
         raise RecordingError(f"{path}: flight {number}: allowed are 1 to {count}")
 
 
-def unclaimed(channels: Iterable[int], parts: Sequence[Part]) -> frozenset[int]:
+def unclaimed(channels: Iterable[int], parts: Sequence[FlightTopics]) -> frozenset[int]:
     """Channels that belong to no flight, and so to each."""
     return frozenset(channels) - {number for part in parts for number in part.channels}
 
 
-def mixed(channels: Iterable[Channel], parts: Sequence[Part]) -> set[str]:
+def mixed(channels: Iterable[Channel], parts: Sequence[FlightTopics]) -> set[str]:
     """Topics of some channels that several flights have in common, but for the one that tells the time."""
     owners: dict[str, set[int]] = {}
     for channel in channels:
@@ -105,7 +105,7 @@ def mixed(channels: Iterable[Channel], parts: Sequence[Part]) -> set[str]:
     return {topic for topic, numbers in owners.items() if len(numbers) > 1}
 
 
-def flights(channels: Mapping[int, Channel], schemas: Mapping[int, Schema]) -> tuple[Part, ...]:
+def flights(channels: Mapping[int, Channel], schemas: Mapping[int, Schema]) -> tuple[FlightTopics, ...]:
     """Flights of a file: those that have an identity in the order in which they began, then the others by topic."""
     ordered = sorted(channels.values(), key=lambda channel: (channel.metadata.get(RECORDING_ID, ""), channel.id))
     groups = {
@@ -113,7 +113,7 @@ def flights(channels: Mapping[int, Channel], schemas: Mapping[int, Schema]) -> t
         for identity, group in groupby(ordered, key=lambda channel: channel.metadata.get(RECORDING_ID, ""))
     }
     unnamed = groups.pop("", [])
-    found: list[Part] = []
+    found: list[FlightTopics] = []
     for identity, group in [*groups.items(), ("", unnamed)]:
         if any(ROLE in channel.metadata for channel in group):
             found.append(_by_role(identity, group))
@@ -122,16 +122,16 @@ def flights(channels: Mapping[int, Channel], schemas: Mapping[int, Schema]) -> t
     return tuple(part for part in found if BODY in part.roles)
 
 
-def _by_role(identity: str, channels: list[Channel]) -> Part:
+def _by_role(identity: str, channels: list[Channel]) -> FlightTopics:
     """A recording whose topics say what they are."""
     roles: dict[str, tuple[str, ...]] = {}
     for channel in channels:
         if (role := channel.metadata.get(ROLE)) is not None:
             roles[role] = (*roles.get(role, ()), channel.topic)
-    return Part(identity, frozenset(channel.id for channel in channels), roles, True)
+    return FlightTopics(identity, frozenset(channel.id for channel in channels), roles, True)
 
 
-def _by_type(identity: str, channels: list[Channel], schemas: Mapping[int, Schema]) -> Iterator[Part]:
+def _by_type(identity: str, channels: list[Channel], schemas: Mapping[int, Schema]) -> Iterator[FlightTopics]:
     """One flight for each topic with states, and for each the topics of the other types that stand beside it."""
     topics: dict[str, dict[str, list[int]]] = {role: {} for role in TYPES}
     for channel in channels:
@@ -142,7 +142,9 @@ def _by_type(identity: str, channels: list[Channel], schemas: Mapping[int, Schem
     for body in sorted(topics[BODY]):
         chosen = {role: _beside(body, role, topics) for role in TYPES}
         numbers = [number for role, names in chosen.items() for name in names for number in topics[role][name]]
-        yield Part(identity, frozenset(numbers), {role: names for role, names in chosen.items() if names}, False)
+        yield FlightTopics(
+            identity, frozenset(numbers), {role: names for role, names in chosen.items() if names}, False
+        )
 
 
 def _beside(body: str, role: str, topics: Mapping[str, Mapping[str, list[int]]]) -> tuple[str, ...]:
@@ -151,7 +153,7 @@ def _beside(body: str, role: str, topics: Mapping[str, Mapping[str, list[int]]])
         return (body,)
     namespace = body.rpartition("/")[0]
     found = [name for name in topics[role] if name.rpartition("/")[0] == namespace]
-    if len(found) > 1 and f"{namespace}/{role}" in found:  # odometry of somebody else
+    if len(found) > 1 and f"{namespace}/{role}" in found:  # odometry of another program
         return (f"{namespace}/{role}",)
     if not found and (len(topics[BODY]) == 1 or role in SHARED):
         return tuple(topics[role])

@@ -13,10 +13,10 @@ import stat
 import sys
 from typing import Any
 
-PATIENCE = 0.1  # s that a reader who is only slow gets; one that took nothing gets none the next time
+WRITE_TIMEOUT = 0.1  # s that a reader who is only slow gets; one that took nothing gets none the next time
 
 
-class Unheeded(io.RawIOBase):
+class NonBlockingWriter(io.RawIOBase):
     """Bytes into a file descriptor, as far as they find room there: never an error, and never a long wait.
 
     Parameters
@@ -48,15 +48,15 @@ class Unheeded(io.RawIOBase):
                 rest = rest[os.write(self._number, rest) :]
                 self._stuck = False
             except BlockingIOError:
-                if self._stuck or not select.select([], [self._number], [], PATIENCE)[1]:
+                if self._stuck or not select.select([], [self._number], [], WRITE_TIMEOUT)[1]:
                     self._stuck = True
                     break
-            except OSError:  # nobody is there any more, or the disk is full
+            except OSError:  # the reader has closed it, or the disk is full
                 break
         return len(data)
 
 
-def wait_for_no_reader() -> None:
+def make_standard_streams_non_blocking() -> None:
     """Let neither Python nor the libraries below wait for who reads the standard output or the error output."""
     for number, name in ((1, "stdout"), (2, "stderr")):
         stream = getattr(sys, name)
@@ -65,7 +65,10 @@ def wait_for_no_reader() -> None:
         stream.flush()
         _unblock(number)
         text = io.TextIOWrapper(
-            io.BufferedWriter(Unheeded(number)), encoding=stream.encoding, errors="replace", line_buffering=True
+            io.BufferedWriter(NonBlockingWriter(number)),
+            encoding=stream.encoding,
+            errors="replace",
+            line_buffering=True,
         )
         setattr(sys, name, text)
 
@@ -76,7 +79,7 @@ def _unblock(number: int) -> None:
     if stat.S_ISFIFO(mode) or stat.S_ISCHR(mode):
         try:  # opened anew it has flags of its own: the shell that has the same terminal keeps those it has
             own = os.open(f"/proc/self/fd/{number}", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
-        except OSError:  # of another user, or nobody reads any more
+        except OSError:  # of another user, or without a reader
             pass
         else:
             os.dup2(own, number)

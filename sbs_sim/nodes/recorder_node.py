@@ -17,17 +17,18 @@ from sbs_sim import checks
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight_loop import FlightLoop
-from sbs_sim.nodes.host import SERVICE_QOS, Component
+from sbs_sim.nodes.component import Component
+from sbs_sim.nodes.qos import SERVICE_QOS
 
 if TYPE_CHECKING:
-    from sbs_sim.nodes.recorder import Recorder
+    from sbs_sim.nodes.flight_log import FlightLog
 
-STATES = ("state", "rotors", "inflow", "odom")  # are written together, and read together by their numbers
-INSTANT_PATIENCE = 1.0  # s until an instant is written: a disk that takes nothing must not hold up the end
-START_PATIENCE = 10.0  # s until a start that was asked for is written
+STATE_TOPICS = ("state", "rotors", "inflow", "odom")  # recorded together, matched by sequence number
+INSTANT_TIMEOUT = 1.0  # s to finish an instant: a blocked disk must not block the end
+START_TIMEOUT = 10.0  # s until a requested start is recorded
 
 
-class Recording(Component):
+class RecorderNode(Component):
     """See the module. A log begins with the start that the flight hands out for it, and not before.
 
     Parameters
@@ -44,12 +45,11 @@ class Recording(Component):
         self._simulation, self._loop, self._flown_with = simulation, loop, parameters
         self._topics: list[tuple[str, Any, QoSProfile, str]] = []
         self._lock = threading.Lock()  # topics may be added while a log begins
-        self._log: Recorder | None = None
-        # Starts are counted as the flight hands them out, its own is 0: that of a log which has ended already is not
-        # taken for the start of the next one.
-        self._handed_out, self._awaited = 0, 0
+        self._log: FlightLog | None = None
+        # Starts are counted from the flight's own, 0: the start of a log that has ended is not that of the next log.
+        self._start_count, self._awaited_start = 0, 0
         self._open = False  # the start of the flight is in the log
-        self._has_begun = threading.Event()  # and all of that instant
+        self._start_recorded = threading.Event()  # and all of that instant
         self._instant = threading.Lock()
         self._channels: list[int] = []  # of the log, by our own numbers
         self._latest: dict[int, tuple[float, bytes]] = {}  # what was written last, by the same
@@ -68,36 +68,36 @@ class Recording(Component):
     def write(self, channel: int, time: float, data: bytes, wait: bool = False, essential: bool = False) -> None:
         """Record a serialised message of a simulation time [s], see `LogWriter.write`; nothing without a log.
 
-        What a flight at rest says or is told again and again is recorded once: time stands still, and there is no news.
+        Repeated messages of a paused flight are recorded once: its time does not change.
         """
         log, channels = self._log, self._channels
         if not self._open or log is None:
             return
-        if essential or self._topics[channel][3] in STATES or not self._repeats(channel, time, data):
+        if essential or self._topics[channel][3] in STATE_TOPICS or not self._repeats(channel, time, data):
             self._latest[channel] = time, data
             log.write(channels[channel], time, data, wait, essential)
 
     def _repeats(self, channel: int, time: float, data: bytes) -> bool:
-        """True if a message says what the last one of the channel has said, at the same time."""
+        """True if the last message of the channel has the same time and content."""
         then, before = self._latest.get(channel, (-1.0, b""))
         if time != then or len(data) != len(before):
             return False
-        kind = self._topics[channel][1]  # by its values, for what stands between them is left to chance
+        kind = self._topics[channel][1]  # compare values: padding bytes are arbitrary
         return data == before or bool(deserialize_message(data, kind) == deserialize_message(before, kind))
 
-    def take_start(self) -> None:
-        """From now on what is written gets into the log, if this is the start of the flight that it waits for."""
-        if self._handed_out == self._awaited:
+    def open_at_start(self) -> None:
+        """Open the log for messages if this is the start of the flight that it waits for."""
+        if self._start_count == self._awaited_start:
             self._open = self._log is not None
-        self._handed_out += 1
+        self._start_count += 1
 
     @contextlib.contextmanager
     def instant(self) -> Iterator[None]:
-        """While all that belongs to an instant of the flight is written: a log does not end in the middle of it."""
+        """Context in which all messages of one instant are written: a log does not end in the middle of it."""
         with self._instant:
             yield
             if self._open:
-                self._has_begun.set()
+                self._start_recorded.set()
 
     @property
     def has_room(self) -> bool:
@@ -122,18 +122,18 @@ class Recording(Component):
     # --------------------------------------------------------------------------------------------- beginning and end
 
     def begin(self, record: str, start: int = 0) -> None:
-        """Make a log, which waits for that start of the flight; `record` is as for `Recorder`.
+        """Make a log, which waits for that start of the flight; `record` is as for `FlightLog`.
 
         Raises
         ------
         RecordingError
             There is one already, the file cannot be made, or a package is missing.
         """
-        from sbs_sim.nodes.recorder import Recorder  # here, because who does not record need not have its packages
+        from sbs_sim.nodes.flight_log import FlightLog  # here, because who does not record need not have its packages
 
         if self._log is not None:
             raise RecordingError(f"recording {self.path} already: record = false ends it")
-        log = Recorder(record, self._simulation, self._flown_with)
+        log = FlightLog(record, self._simulation, self._flown_with)
         with self._lock:
             try:
                 self._channels = [log.channel(*topic) for topic in self._topics]
@@ -141,8 +141,8 @@ class Recording(Component):
                 log.discard()
                 raise
             self._latest = {}
-            self._awaited, self._log = start, log
-            self._has_begun.clear()
+            self._awaited_start, self._log = start, log
+            self._start_recorded.clear()
 
     def end(self) -> str:
         """End the log; its path, empty if there is none.
@@ -150,14 +150,14 @@ class Recording(Component):
         Raises
         ------
         RecordingError
-            It is not whole.
+            It is incomplete.
         """
         log = self._log
         if log is None:
             return ""
-        whole = self._instant.acquire(timeout=INSTANT_PATIENCE)
+        complete = self._instant.acquire(timeout=INSTANT_TIMEOUT)
         self._open = False
-        if whole:
+        if complete:
             self._instant.release()
         log.close()  # before it is no longer the present one: who sees that there is none may read it
         self._log = None
@@ -177,16 +177,16 @@ class Recording(Component):
             if request.path:
                 raise RecordingError(f"path = {checks.shown(request.path)}: allowed where a log begins, record = true")
             if self._log is not None:
-                self._has_begun.wait(START_PATIENCE)  # a log without its start would be of no use
+                self._start_recorded.wait(START_TIMEOUT)  # a log without its start would be of no use
             response.path = self.end()
             if not response.path:
                 raise RecordingError("record = false: nothing is recorded")
             return
-        self.begin(request.path, start=self._awaited + 1)
+        self.begin(request.path, start=self._awaited_start + 1)
         try:
             self._loop.begin_log()
-            if not self._has_begun.wait(START_PATIENCE):
-                raise RecordingError(f"the flight has not handed out its start within {START_PATIENCE:g} s")
+            if not self._start_recorded.wait(START_TIMEOUT):
+                raise RecordingError(f"the flight has not handed out its start within {START_TIMEOUT:g} s")
             response.path = self.path
         except SbsError:
             self._open = False

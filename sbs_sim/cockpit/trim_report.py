@@ -22,7 +22,7 @@ FAINT, WARNING = "color:#5c6670", "color:#D55E00"
 
 
 @dataclass(frozen=True, eq=False)
-class Trimmed(ByContent):
+class TrimResult(ByContent):
     """A trim that a service has found.
 
     Attributes
@@ -67,7 +67,7 @@ def condition_words(condition: TrimCondition) -> str:
     return ", ".join(parts)
 
 
-def trim_page(trimmed: Trimmed, snapshot: Snapshot, aircraft: Aircraft) -> str:
+def trim_page(trimmed: TrimResult, snapshot: Snapshot, aircraft: Aircraft) -> str:
     """A trim beside the flight as it is, and whether the flight is in it."""
     _, pitch, roll = quaternion_to_euler(snapshot.state[S.ATTITUDE : S.VELOCITY])
     controls = aircraft.unmix(snapshot.swashplate)
@@ -87,14 +87,14 @@ def trim_page(trimmed: Trimmed, snapshot: Snapshot, aircraft: Aircraft) -> str:
     )
 
 
-def model_page(trimmed: Trimmed, snapshot: Snapshot) -> str:
+def model_page(trimmed: TrimResult, snapshot: Snapshot) -> str:
     """What was linearized, and whether the flight is there."""
     return line(f"Linear model at {condition_words(trimmed.condition)}: see Modes") + "".join(
         line(text, WARNING) for text in (*unsteady(trimmed, snapshot), *trimmed.notes)
     )
 
 
-def unsteady(trimmed: Trimmed, snapshot: Snapshot) -> list[str]:
+def unsteady(trimmed: TrimResult, snapshot: Snapshot) -> list[str]:
     """In what a flight is not in its trim, one line or none: airspeed, climb, sideslip and turn are alike."""
     _, pitch, roll = quaternion_to_euler(snapshot.state[S.ATTITUDE : S.VELOCITY])
     turn = trimmed.condition.turn_rate  # of the heading; Stevens and Lewis, eq. (1.4-4)

@@ -49,7 +49,7 @@ STYLE = """
 """
 
 
-def dressed(response: Response) -> Response:
+def with_page_head(response: Response) -> Response:
     """A response of viser's server, with ours in it if it is the page."""
     if response.status_code != 200 or not response.headers.get("Content-Type", "").startswith("text/html"):
         return response

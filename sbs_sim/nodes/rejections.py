@@ -1,0 +1,38 @@
+"""Counter of rejected messages."""
+
+from typing import Any
+
+from rclpy.node import Node
+
+WARNING_PERIOD = 1.0  # s between warnings about bad input
+
+
+class Rejections:
+    """Counts the messages that a node has rejected, and logs the reason at most once a second.
+
+    Parameters
+    ----------
+    node : Node
+    what : str
+        Name of the messages.
+
+    Attributes
+    ----------
+    count : int
+    """
+
+    def __init__(self, node: Node, what: str) -> None:
+        self._node, self._what = node, what
+        self.count = 0
+        self._last = "none"
+
+    def add(self, reason: Exception) -> None:
+        """Count one."""
+        self.count += 1
+        self._last = str(reason)
+        log = self._node.get_logger()
+        log.warning(f"{self._what} rejected: {reason}", throttle_duration_sec=WARNING_PERIOD)
+
+    def values(self) -> dict[str, Any]:
+        """Values for the diagnostics."""
+        return {"rejected_messages": self.count, "last_rejection": self._last}

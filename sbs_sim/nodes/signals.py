@@ -1,0 +1,30 @@
+"""Interruptions of a process: Ctrl-C, SIGTERM and SIGHUP.
+
+Nothing heavy is imported here: Ctrl-C is obeyed while the compiled model is still being loaded.
+"""
+
+import signal
+from collections.abc import Callable
+
+INTERRUPTED = 128 + signal.SIGINT  # exit code of a program that was not meant to run until Ctrl-C
+
+
+def when_interrupted(act: Callable[..., object]) -> None:
+    """Set the handler of interruptions: SIGINT, SIGTERM, and SIGHUP unless it is ignored (nohup)."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if (number, signal.getsignal(number)) != (signal.SIGHUP, signal.SIG_IGN):  # nohup
+            signal.signal(number, act)
+
+
+def ignore_interruptions() -> None:
+    """Ignore interruptions from now on: the process is ending."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+
+
+def note_interruptions(interruptions: list[int]) -> None:
+    """Append the numbers of interruptions to a list, and do nothing else.
+
+    A handler runs in the middle of what the main thread does: to set an event there could deadlock.
+    """
+    when_interrupted(lambda number, _: interruptions.append(number))

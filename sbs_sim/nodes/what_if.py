@@ -33,7 +33,7 @@ def fly_with(
 
     Parameters
     ----------
-    flight : Flight
+    flight : RecordedFlight
     changes : sequence of str
         "PATH=VALUE" each, see `Aircraft.with_values`.
     last : int

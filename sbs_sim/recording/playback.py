@@ -35,7 +35,7 @@ class Playback:
     ----------
     schemas, channels : dict
         Records by number; of a flight that was chosen its channels and those that belong to none.
-    flights : tuple of Part
+    flights : tuple of FlightTopics
         Those that may be played.
     warning : str
         What is wrong with the file all the same; empty if nothing is.

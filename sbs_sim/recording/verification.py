@@ -72,7 +72,7 @@ def verify(flight: RecordedFlight, progress: Callable[[float, float], None] | No
 
     Parameters
     ----------
-    flight : Flight
+    flight : RecordedFlight
     progress : callable, optional
         Called with the number of states that have been compared and of all of them.
 

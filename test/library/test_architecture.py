@@ -185,6 +185,29 @@ def test_imports_run_one_way(name):
             assert [item for item in own_imports(name) if within(item, above)] == []
 
 
+WITHOUT_CIRCLES = ["sbs_sim.nodes", "sbs_sim.recording", "sbs_sim.cockpit", "sbs_sim.pilot", "sbs_sim.flight_loop"]
+
+
+def late_imports_of(name):
+    """Full names of the modules that a module imports by name when it needs them."""
+    calls = [node for node in ast.walk(TREES[name]) if isinstance(node, ast.Call)]
+    names = {item.value for call in calls for item in call.args if isinstance(item, ast.Constant)}
+    return {item for item in names if item in MODULES}
+
+
+@pytest.mark.parametrize("package", WITHOUT_CIRCLES)
+def test_no_file_imports_itself_by_way_of_others(package):
+    graph = {name: (imports_of(name) | late_imports_of(name)) & set(MODULES) for name in MODULES}
+    members = [name for name in MODULES if within(name, [package])]
+    assert members
+    for name in members:
+        reached, waiting = set(), list(graph[name])
+        while waiting:
+            reached.add(found := waiting.pop())
+            waiting += graph[found] - reached
+        assert name not in reached, f"{name} is imported by what it imports"
+
+
 @pytest.mark.parametrize("name", [name for name in MODULES if within(name, ["sbs_sim.model"])])
 def test_the_model_knows_nothing_of_the_time_of_day(name):
     assert not imports_of(name) & {"time", "datetime", "threading", "asyncio"}

@@ -110,7 +110,7 @@ class FlightLoop:
         self._playing = True
         self._stopping = False
         self._fault = ""
-        self.resets = 0  # read by those who must know that what they commanded before is void
+        self.resets = 0  # readers compare it: earlier commands are void after a reset
         self._missed = self._dropped = 0
         self._events = [simulation.beginning()]  # not handed out yet
         # At most the newest command. A deque, for it is emptied and filled by two threads and loses nothing.
@@ -128,7 +128,7 @@ class FlightLoop:
         self._thread.start()
 
     def read_by(self, take: Callable[[LoopReport], bool]) -> None:
-        """Let the reader take reports in the flight's own thread where the flight would wait for him anyway.
+        """Let the reader take reports in the flight's own thread when the flight would wait for it anyway.
 
         That saves waking two threads at every tick. Before the start; the reader then calls `reports.task_done` after
         each report that he has read from the queue, for a report is taken only if there is none before it.

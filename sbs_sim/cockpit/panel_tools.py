@@ -22,6 +22,6 @@ def by_user(act: Callable[[], None]) -> Callable[[Any], None]:
 
 
 def notify(server: ViserServer, title: str, text: str) -> None:
-    """Tell everyone who looks at the page what was refused."""
+    """Show every client what was rejected."""
     for client in server.get_clients().values():
         client.add_notification(title, text, color="orange", auto_close_seconds=NOTIFICATION_TIME)

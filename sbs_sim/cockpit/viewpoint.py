@@ -14,7 +14,7 @@ NARROW = 0.9  # width over height of a picture; from further away a narrower one
 
 
 class Viewpoint:
-    """Cameras of all who look, at a distance that goes with the size of the aircraft.
+    """Cameras of all clients, at a distance that goes with the size of the aircraft.
 
     Parameters
     ----------

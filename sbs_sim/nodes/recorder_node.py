@@ -129,7 +129,7 @@ class RecorderNode(Component):
         RecordingError
             There is one already, the file cannot be made, or a package is missing.
         """
-        from sbs_sim.nodes.flight_log import FlightLog  # here, because who does not record need not have its packages
+        from sbs_sim.nodes.flight_log import FlightLog  # here: its packages are needed for recording only
 
         if self._log is not None:
             raise RecordingError(f"recording {self.path} already: record = false ends it")
@@ -159,7 +159,7 @@ class RecorderNode(Component):
         self._open = False
         if complete:
             self._instant.release()
-        log.close()  # before it is no longer the present one: who sees that there is none may read it
+        log.close()  # first: once `path` is empty, the file may be read
         self._log = None
         if log.fault:
             raise RecordingError(f"the log ends before the flight: {log.fault}")

@@ -1,4 +1,4 @@
-"""Output that nothing waits for: a reader who has stopped to read must not stop the flight.
+"""Non-blocking standard streams: a reader that has stopped reading must not stop the flight.
 
 A pipe or a terminal that nobody reads is full after some lines, and then holds up whoever writes into it: Python, and
 ROS too, which writes its log lines in machine code. So both standard streams get descriptions that never block. What
@@ -13,7 +13,7 @@ import stat
 import sys
 from typing import Any
 
-WRITE_TIMEOUT = 0.1  # s that a reader who is only slow gets; one that took nothing gets none the next time
+WRITE_TIMEOUT = 0.1  # s to wait for a slow reader; none after a wait in vain
 
 
 class NonBlockingWriter(io.RawIOBase):
@@ -57,10 +57,10 @@ class NonBlockingWriter(io.RawIOBase):
 
 
 def make_standard_streams_non_blocking() -> None:
-    """Let neither Python nor the libraries below wait for who reads the standard output or the error output."""
+    """Replace both standard streams by ones that never block Python or the libraries below."""
     for number, name in ((1, "stdout"), (2, "stderr")):
         stream = getattr(sys, name)
-        if stream is None:  # closed by who started this process
+        if stream is None:  # closed by the parent process
             continue
         stream.flush()
         _unblock(number)

@@ -14,7 +14,7 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 
-RESULT_TIMEOUT = 60  # s that a result is kept for whoever asks late; they are large
+RESULT_TIMEOUT = 60  # s that a result is kept for late requests; results are large
 
 
 class ThreadedActionServer(ActionServer):

@@ -15,7 +15,7 @@ from sbs_sim.analysis.sweep import sweep
 from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.flight.engine import Engine
-from sbs_sim.flight.trim_point import TrimCondition, TrimPoint
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
 
@@ -39,7 +39,7 @@ def trim_rows(aircraft: Aircraft, timed: Timed) -> list[Row]:
         rows.append((f"trim {name}, the first of an aircraft", 1e3 * seconds, "ms", note))
         seconds, note = timed(lambda speed=speed: trim(aircraft, airspeed=speed), 21)
         rows.append((f"trim {name}, from the hover that is kept", 1e3 * seconds, "ms", note))
-        problem, condition = TrimProblem(aircraft, True, True, 12), TrimCondition(speed)
+        problem, condition = TrimProblem(aircraft, Fidelity()), TrimCondition(speed)
         guess = MomentumTheory(problem).guess(condition)
 
         def generic(problem: TrimProblem = problem, condition: TrimCondition = condition, guess: Any = guess) -> Any:

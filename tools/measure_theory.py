@@ -23,7 +23,7 @@ from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.two_loop import _TwoLoops
 from sbs_sim.errors import TrimError
-from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition
 
 FORWARD, FASTEST, STEP = 15.0, 30.0, 0.5  # m/s
 ONLY_FLAP = {"lead_lag": False, "cyclic_inflow": False}
@@ -170,7 +170,7 @@ def guesses() -> None:
     data = Path(__file__).resolve().parents[1] / "test" / "data"
     for name in ("sbs", "sbs_paper", *(data / f"{file}.yaml" for file in ("tail_rotor", "tandem", "uh60a"))):
         aircraft = Aircraft.load(name)
-        guess = MomentumTheory(TrimProblem(aircraft, True, True, 12)).guess(TrimCondition())
+        guess = MomentumTheory(TrimProblem(aircraft, Fidelity())).guess(TrimCondition())
         points = [trim(aircraft, speed) for speed in (0.0, 20.0)]
         off = np.degrees(np.abs(guess[2:6] - points[0].controls)).max()
         steps = " and ".join(str(point.iterations) for point in points)
@@ -204,7 +204,7 @@ def outer_gains() -> None:
     aircraft = undamped_sbs()
     for fidelity, speed in (({}, 0.0), ({}, 2.0), (WITHOUT_CYCLIC_INFLOW, 0.0), (WITHOUT_CYCLIC_INFLOW, FORWARD)):
         point = trim(aircraft, speed, **fidelity)
-        problem = TrimProblem(aircraft, True, not fidelity, point.azimuth_count)
+        problem = TrimProblem(aircraft, Fidelity(True, not fidelity, point.azimuth_count))
         names = list(point.state_names)
         rotor_states = [point.state[names.index(name)] for name in _rotor_names(names, problem)]
         start = np.concatenate([[point.pitch, point.roll], point.controls, rotor_states])

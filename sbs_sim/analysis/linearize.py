@@ -78,9 +78,7 @@ def linearize(
     LinearizationError
         A value out of range, a trim of another aircraft, or a condition together with a trim.
     """
-    checks.instance("aircraft", aircraft, Aircraft, LinearizationError)
-    checks.choice("method", method, METHODS, LinearizationError)
-    step_scale = checks.number("step_scale", step_scale, *STEP_SCALES, "", LinearizationError)
+    _check_options(aircraft, method, step_scale)
     given: dict[str, Any] = {
         "airspeed": airspeed,
         "climb_rate": climb_rate,
@@ -97,6 +95,14 @@ def linearize(
     elif given:
         name, value = next(iter(given.items()))
         raise LinearizationError(f"{name} = {checks.shown(value)}: not allowed with a point, which has its own")
+    return linearize_trim(aircraft, point, method=method, step_scale=step_scale)
+
+
+def linearize_trim(
+    aircraft: Aircraft, point: TrimPoint, *, method: str = "averaged", step_scale: float = 1.0
+) -> LinearModel:
+    """Linearize an aircraft about a trim of it; see `linearize`."""
+    step_scale = _check_options(aircraft, method, step_scale)
     checks.instance("point", point, TrimPoint, LinearizationError)
     if point.parameter_hash != aircraft.parameter_hash:
         raise LinearizationError("point: allowed is a trim of this aircraft, it is one of another")
@@ -105,6 +111,13 @@ def linearize(
         return model
     built = blocks(aircraft, point, difference_steps(aircraft, step_scale))
     return replace(model, method="paper", a=built["A"], b=built["B"], blocks=built)
+
+
+def _check_options(aircraft: Aircraft, method: str, step_scale: float) -> float:
+    """Raise LinearizationError for a value out of range; the factor on all steps as a number."""
+    checks.instance("aircraft", aircraft, Aircraft, LinearizationError)
+    checks.choice("method", method, METHODS, LinearizationError)
+    return checks.number("step_scale", step_scale, *STEP_SCALES, "", LinearizationError)
 
 
 def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> LinearModel:

@@ -8,7 +8,7 @@ from __future__ import annotations  # `help` then shows types by their names
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -20,13 +20,14 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.paths import unit_of
 from sbs_sim.analysis.export import model_to_dict
 from sbs_sim.analysis.linear_model import LinearModel
-from sbs_sim.analysis.linearize import linearize
+from sbs_sim.analysis.linearize import linearize_trim
 from sbs_sim.analysis.modes import Mode
-from sbs_sim.analysis.trim import Guess, checked_guess, trim
+from sbs_sim.analysis.trim import Guess, checked_guess, solve_trim
 from sbs_sim.concurrency.parallel import checked_workers, compute
 from sbs_sim.errors import AircraftError, SbsError, SweepError
-from sbs_sim.flight.trim_point import TrimPoint
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.model import state as S
+from sbs_sim.output.notebook import sweep_html
 
 if TYPE_CHECKING:
     import distributed
@@ -198,8 +199,6 @@ class Sweep:
         return {"parameter": self.parameter, "points": points}
 
     def _repr_html_(self) -> str:
-        from sbs_sim.output.notebook import sweep_html
-
         return sweep_html(self)
 
 
@@ -262,21 +261,53 @@ def sweep(
         No values, one that is not finite, an unknown parameter, or one that is given a single value too; no whole
         number of workers.
     TrimError
-        A guess that is none.
+        A condition or fidelity out of range, or a guess that is none.
     ClusterError
         A cluster that cannot be reached, or that would not give the same.
     """
+    parts = {"airspeed": airspeed, "climb_rate": climb_rate, "sideslip": sideslip, "turn_rate": turn_rate}
+    given = {name: value for name, value in parts.items() if value is not None}
+    if isinstance(parameter, str) and parameter in given:
+        raise SweepError(f"{parameter} = {checks.shown(given[parameter])}: not allowed where {parameter} is swept")
+    return sweep_flights(
+        aircraft,
+        parameter,
+        values,
+        TrimCondition(**given),
+        Fidelity(lead_lag, cyclic_inflow, azimuth_count),
+        guess=guess,
+        linear=linear,
+        workers=workers,
+        progress=progress,
+        cancelled=cancelled,
+        dask=dask,
+    )
+
+
+def sweep_flights(
+    aircraft: Aircraft,
+    parameter: str,
+    values: ArrayLike,
+    condition: TrimCondition,
+    fidelity: Fidelity,
+    *,
+    guess: Guess | None = None,
+    linear: bool = True,
+    workers: int | None = None,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    dask: str | distributed.Client | None = None,
+) -> Sweep:
+    """Trim, and linearize, along one parameter; see `sweep`. The condition is zero in what is swept."""
     checks.instance("aircraft", aircraft, Aircraft, SweepError)
     if guess is not None:
         checked_guess(aircraft.layout, guess)
     numbers = _checked_values(values)
     linear = checks.flag("linear", linear, SweepError)
     _check_parameter(aircraft, parameter)
-    condition = {"airspeed": airspeed, "climb_rate": climb_rate, "sideslip": sideslip, "turn_rate": turn_rate}
-    condition = {name: value for name, value in condition.items() if value is not None}
-    if parameter in condition:
-        raise SweepError(f"{parameter} = {checks.shown(condition[parameter])}: not allowed where {parameter} is swept")
-    fidelity = {"lead_lag": lead_lag, "cyclic_inflow": cyclic_inflow, "azimuth_count": azimuth_count}
+    if parameter in CONDITIONS and getattr(condition, parameter) != 0.0:
+        value = checks.shown(getattr(condition, parameter))
+        raise SweepError(f"{parameter} = {value}: not allowed where {parameter} is swept")
     count = checked_workers(workers, dask, SweepError)
     points = [SweepPoint(value, None, None, CANCELLED) for value in numbers]
     done = itertools.count(1)
@@ -286,8 +317,7 @@ def sweep(
         if progress is not None:
             progress(point, next(done), len(points))
 
-    given = {**condition, **fidelity, "guess": guess}
-    calls = [(aircraft, parameter, given, linear, value) for value in numbers]
+    calls = [(aircraft, parameter, value, condition, fidelity, guess, linear) for value in numbers]
     compute(_solve, calls, keep, workers=count, cancelled=cancelled, dask=dask)
     return Sweep(parameter, tuple(points))
 
@@ -312,16 +342,24 @@ def _check_parameter(aircraft: Aircraft, parameter: str) -> None:
         raise SweepError(f"parameter {parameter!r}: allowed are {', '.join(CONDITIONS)} or a path; {error}") from None
 
 
-def _solve(aircraft: Aircraft, parameter: str, given: dict[str, Any], linear: bool, value: float) -> SweepPoint:
+def _solve(
+    aircraft: Aircraft,
+    parameter: str,
+    value: float,
+    condition: TrimCondition,
+    fidelity: Fidelity,
+    guess: Guess | None,
+    linear: bool,
+) -> SweepPoint:
     """One point, with its error if there is one."""
     point = None
     try:
         if parameter in CONDITIONS:
-            given = {**given, parameter: value}
+            condition = replace(condition, **{parameter: value})
         else:
             aircraft = aircraft.with_value(parameter, value)
-        point = trim(aircraft, **given)
-        return SweepPoint(value, point, linearize(aircraft, point=point) if linear else None, None)
+        point = solve_trim(aircraft, condition, fidelity, guess=guess)
+        return SweepPoint(value, point, linearize_trim(aircraft, point) if linear else None, None)
     except SbsError as error:
         return SweepPoint(value, point, None, str(error))
 

@@ -17,7 +17,7 @@ from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.trim_search import find
 from sbs_sim.analysis.two_loop import solve_by_two_loops
 from sbs_sim.errors import TrimError
-from sbs_sim.flight.trim_point import TrimCondition, TrimPoint
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.state import StateLayout
 
@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 Guess = TrimPoint | ArrayLike | tuple[ArrayLike, ArrayLike]
 
 METHODS = ("newton", "two_loop")
-LARGEST_AZIMUTH_COUNT = 1000
 
 
 def trim(
@@ -75,11 +74,22 @@ def trim(
     """
     checks.instance("aircraft", aircraft, Aircraft, TrimError)
     condition = TrimCondition(airspeed, climb_rate, sideslip, turn_rate)
-    lead_lag = checks.flag("lead_lag", lead_lag, TrimError)
-    cyclic_inflow = checks.flag("cyclic_inflow", cyclic_inflow, TrimError)
-    azimuth_count = checks.whole("azimuth_count", azimuth_count, 1, LARGEST_AZIMUTH_COUNT, TrimError)
+    fidelity = Fidelity(lead_lag, cyclic_inflow, azimuth_count)
+    return solve_trim(aircraft, condition, fidelity, method=method, guess=guess)
+
+
+def solve_trim(
+    aircraft: Aircraft,
+    condition: TrimCondition,
+    fidelity: Fidelity,
+    *,
+    method: str = "newton",
+    guess: Guess | None = None,
+) -> TrimPoint:
+    """Trim an aircraft in a flight condition; see `trim`."""
+    checks.instance("aircraft", aircraft, Aircraft, TrimError)
     checks.choice("method", method, METHODS, TrimError)
-    problem = TrimProblem(aircraft, lead_lag, cyclic_inflow, azimuth_count)
+    problem = TrimProblem(aircraft, fidelity)
     start = None if guess is None else _start(problem, condition, checked_guess(aircraft.layout, guess))
     if method == "two_loop":
         start = MomentumTheory(problem).guess(condition) if start is None else start

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.flight.engine import Engine, points_engine
-from sbs_sim.flight.trim_point import TrimCondition, TrimPoint
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.flight.validity import warnings
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
@@ -57,12 +57,12 @@ class TrimProblem:
         Mean loads of the last residual.
     """
 
-    def __init__(self, aircraft: Aircraft, lead_lag: bool, cyclic_inflow: bool, azimuth_count: int) -> None:
+    def __init__(self, aircraft: Aircraft, fidelity: Fidelity) -> None:
         self.aircraft = aircraft
-        self.lead_lag, self.cyclic_inflow, self.azimuth_count = lead_lag, cyclic_inflow, azimuth_count
+        self.fidelity = fidelity
         self.layout = aircraft.layout
-        self.engine = points_engine(aircraft.arranged(lead_lag, cyclic_inflow, "points"))
-        self._psi = azimuths(self.layout.blades, azimuth_count)
+        self.engine = points_engine(aircraft.arranged(fidelity.lead_lag, fidelity.cyclic_inflow, "points"))
+        self._psi = azimuths(self.layout.blades, fidelity.azimuth_count)
         self._places, equations, owners = self._rotor_unknowns()
         self._owners = np.concatenate([np.full(BODY_UNKNOWNS, len(aircraft.rotors)), owners])
         self.equations = np.concatenate([np.arange(S.VELOCITY, S.BODY_SIZE), equations])
@@ -81,10 +81,10 @@ class TrimProblem:
         for j in range(len(self.aircraft.rotors)):
             places += list(index[self.layout.flap(j)])
             equations += list(index[self.layout.flap_rate(j)])
-            if self.lead_lag:
+            if self.fidelity.lead_lag:
                 places += list(index[self.layout.lag(j)])
                 equations += list(index[self.layout.lag_rate(j)])
-            inflow = index[self.layout.inflow(j)][: 3 if self.cyclic_inflow else 1]
+            inflow = index[self.layout.inflow(j)][: 3 if self.fidelity.cyclic_inflow else 1]
             places += list(inflow)
             equations += list(inflow)
             owners += [j] * (len(places) - len(owners))
@@ -133,7 +133,7 @@ class TrimProblem:
         """
         steps = np.full(len(unknowns), ROTOR_STEP)
         steps[:ATTITUDE_UNKNOWNS] = BODY_STEP
-        psi = azimuths(self.layout.blades, min(self.azimuth_count, JACOBIAN_AZIMUTHS))
+        psi = azimuths(self.layout.blades, min(self.fidelity.azimuth_count, JACOBIAN_AZIMUTHS))
         engine, (forward, backward) = self.engine, (sides := np.empty((2, len(unknowns), len(self.equations))))
         trim_sides(
             *(engine.code.derivative, engine.model, unknowns, steps, self._owners, condition.along_heading()),
@@ -182,9 +182,9 @@ class TrimProblem:
         torque = self.loads[:, R.TORQUE].copy()
         return TrimPoint(
             condition=condition,
-            lead_lag=self.lead_lag,
-            cyclic_inflow=self.cyclic_inflow,
-            azimuth_count=self.azimuth_count,
+            lead_lag=self.fidelity.lead_lag,
+            cyclic_inflow=self.fidelity.cyclic_inflow,
+            azimuth_count=self.fidelity.azimuth_count,
             controls=controls,
             swashplate=swash,
             pitch=float(unknowns[0]),
@@ -211,7 +211,7 @@ class TrimProblem:
 
     def _warnings(self, x: Array, swash: Array) -> tuple[str, ...]:
         """Where the model does not hold, by the mean of the working states over a few azimuths."""
-        engine, count = self.engine, min(self.azimuth_count, JACOBIAN_AZIMUTHS)
+        engine, count = self.engine, min(self.fidelity.azimuth_count, JACOBIAN_AZIMUTHS)
         psi = azimuths(self.layout.blades, count)
         states, angles = engine.lanes([x]), engine.lanes([swash.ravel()])
         places, still_air = engine.lanes(list(psi)), engine.memory(3)

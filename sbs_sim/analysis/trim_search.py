@@ -142,7 +142,7 @@ class _Search:
         """Hover by momentum theory, and from it the flight at once."""
         known, problem, hover = self._problem.aircraft.kept, self._problem, self._condition.scaled(0.0)
         # by its text, in which zeros have signs: no bit depends on what was looked for before
-        key = problem.lead_lag, problem.cyclic_inflow, problem.azimuth_count, repr(hover)
+        key = problem.fidelity, repr(hover)
         if key not in known:
             known[key] = self._hovering(hover)
         self._hover, problem.loads, iterations, error = known[key]

@@ -2,6 +2,7 @@
 
 import argparse
 from collections import Counter
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from sbs_sim.commands.common import (
@@ -74,12 +75,11 @@ def _work(arguments: argparse.Namespace) -> None:
     check_target(arguments.json)
     if not 0.01 <= arguments.every <= 1e6:
         raise BatchError(f"--every {arguments.every:g}: allowed are 0.01 to 1e+06 s")
-    condition = flight(arguments)
-    fidelity = {name: condition.pop(name) for name in ("lead_lag", "cyclic_inflow")}
+    condition, fidelity = flight(arguments)
     cases = gust_cases(
         aircraft(arguments),
         arguments.flights,
-        condition,
+        {**asdict(condition), "azimuth_count": fidelity.azimuth_count},
         turbulence=arguments.turbulence,
         length=arguments.length,
         seed=arguments.seed,
@@ -94,7 +94,8 @@ def _work(arguments: argparse.Namespace) -> None:
             workers=arguments.workers,
             dask=arguments.dask,
             progress=progress,
-            **fidelity,
+            lead_lag=fidelity.lead_lag,
+            cyclic_inflow=fidelity.cyclic_inflow,
         )
     _print_batch(batch)
     if arguments.csv:

@@ -18,7 +18,7 @@ from sbs_sim.terminal.command_line import Parser, assignment
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
-    from sbs_sim.flight.trim_point import TrimPoint
+    from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 
 DEGREES = 180.0 / math.pi
 INTERRUPTED = 130
@@ -144,26 +144,23 @@ def aircraft(arguments: argparse.Namespace) -> "Aircraft":
     return chosen.with_values(dict(arguments.set)) if arguments.set else chosen
 
 
-def flight(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Arguments for `sbs_sim.trim`: condition, as far as it is given, and fidelity, in SI units and radians.
+def flight(arguments: argparse.Namespace) -> "tuple[TrimCondition, Fidelity]":
+    """Flight condition, zero where it is not given, and fidelity.
 
     Raises
     ------
     TrimError
-        An angle out of range, in degrees as it was typed.
+        A value out of range, angles in degrees as they were typed.
     """
-    condition = {
-        "airspeed": arguments.airspeed,
-        "climb_rate": arguments.climb_rate,
-        "sideslip": arguments.sideslip_deg and radians("sideslip", arguments.sideslip_deg),
-        "turn_rate": arguments.turn_rate_deg and radians("turn_rate", arguments.turn_rate_deg),
-    }
-    return {
-        **{name: value for name, value in condition.items() if value is not None},
-        "lead_lag": arguments.lead_lag,
-        "cyclic_inflow": arguments.cyclic_inflow,
-        "azimuth_count": arguments.azimuth_count,
-    }
+    from sbs_sim.flight.trim_point import Fidelity, TrimCondition
+
+    condition = TrimCondition(
+        airspeed=arguments.airspeed or 0.0,
+        climb_rate=arguments.climb_rate or 0.0,
+        sideslip=radians("sideslip", arguments.sideslip_deg or 0.0),
+        turn_rate=radians("turn_rate", arguments.turn_rate_deg or 0.0),
+    )
+    return condition, Fidelity(arguments.lead_lag, arguments.cyclic_inflow, arguments.azimuth_count)
 
 
 def guess(arguments: argparse.Namespace) -> list[float] | None:

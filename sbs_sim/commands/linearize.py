@@ -76,14 +76,16 @@ def make_parser() -> Parser:
 def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.analysis.export import ENCODERS
     from sbs_sim.analysis.linear_model import growing_rotor_modes_text
-    from sbs_sim.analysis.linearize import linearize
+    from sbs_sim.analysis.linearize import linearize_trim
+    from sbs_sim.analysis.trim import solve_trim
     from sbs_sim.output.files import check_target, write
     from sbs_sim.output.json_text import to_json
 
     check_target(arguments.out, ENCODERS)
     check_target(arguments.json)
     craft = aircraft(arguments)
-    full = linearize(craft, **flight(arguments), method=arguments.method, guess=guess(arguments))
+    point = solve_trim(craft, *flight(arguments), guess=guess(arguments))
+    full = linearize_trim(craft, point, method=arguments.method)
     model = full.quasi_static() if arguments.quasi_static else full
     _print_model(craft, model)
     print(f"growing rotor modes: {growing_rotor_modes_text(full, craft)}")

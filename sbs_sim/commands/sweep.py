@@ -80,7 +80,7 @@ def _work(arguments: argparse.Namespace) -> None:
     if typed.endswith("_deg") and typed in TYPED:
         values = [math.radians(value) for value in values]
     from sbs_sim.analysis.export import sweep_to_csv
-    from sbs_sim.analysis.sweep import sweep
+    from sbs_sim.analysis.sweep import sweep_flights
     from sbs_sim.output.files import check_target, write
     from sbs_sim.output.json_text import to_json
 
@@ -89,11 +89,11 @@ def _work(arguments: argparse.Namespace) -> None:
     craft = aircraft(arguments)
     _check_parameter(craft, arguments.parameter, typed)
     with progress_bar(" points", len(values)) as progress:
-        found = sweep(
+        found = sweep_flights(
             craft,
             parameter,
             values,
-            **flight(arguments),
+            *flight(arguments),
             guess=guess(arguments),
             linear=arguments.linear,
             workers=arguments.workers,

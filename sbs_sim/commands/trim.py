@@ -51,15 +51,15 @@ def make_parser() -> Parser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.analysis.linearize import linearize
-    from sbs_sim.analysis.trim import trim
+    from sbs_sim.analysis.linearize import linearize_trim
+    from sbs_sim.analysis.trim import solve_trim
     from sbs_sim.output.files import check_target, write
     from sbs_sim.output.json_text import to_json
 
     check_target(arguments.json)
     craft = aircraft(arguments)
-    point = trim(craft, **flight(arguments), method=arguments.method, guess=guess(arguments))
-    print_trim(craft, point, linearize(craft, point=point).control_effects)
+    point = solve_trim(craft, *flight(arguments), method=arguments.method, guess=guess(arguments))
+    print_trim(craft, point, linearize_trim(craft, point).control_effects)
     if arguments.json:
         write(arguments.json, to_json(point.to_dict()))
 

@@ -1,4 +1,4 @@
-"""A steady flight: the condition to be trimmed, and the trim that was found (theory.md section 8)."""
+"""A steady flight: its condition, the fidelity of the model, and the trim that was found (theory.md section 8)."""
 
 import math
 from collections.abc import Iterator
@@ -26,6 +26,7 @@ LIMITS = {
     "sideslip": (math.pi, "rad"),
     "turn_rate": (3.0, "rad/s"),
 }
+MAX_AZIMUTH_COUNT = 1000
 ROTOR_LOADS = ("thrust", "torque", "power")
 
 
@@ -89,6 +90,37 @@ class TrimCondition:
         """Velocity forward, right and down in axes of the heading [m/s], and its rate [rad/s], shape (4,)."""
         along, across = cosine_and_sine(self.sideslip)
         return np.array([self.airspeed * along, self.airspeed * across, -self.climb_rate, self.turn_rate])
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """What a trim, and all that is derived from it, takes into account.
+
+    Parameters
+    ----------
+    lead_lag : bool
+        False holds the blades at zero lag.
+    cyclic_inflow : bool
+        False holds the cyclic parts of the inflow at zero.
+    azimuth_count : int
+        N_c, number of azimuths of the averages, 1 to 1000.
+
+    Raises
+    ------
+    TrimError
+        A value of another kind or out of range.
+    """
+
+    lead_lag: bool = True
+    cyclic_inflow: bool = True
+    azimuth_count: int = 12
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        for name in ("lead_lag", "cyclic_inflow"):
+            object.__setattr__(self, name, checks.flag(name, getattr(self, name), TrimError))
+        count = checks.whole("azimuth_count", self.azimuth_count, 1, MAX_AZIMUTH_COUNT, TrimError)
+        object.__setattr__(self, "azimuth_count", count)
 
 
 @dataclass(frozen=True, eq=False)

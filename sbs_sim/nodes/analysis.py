@@ -19,10 +19,11 @@ from sbs_msgs.msg import LinearModel, TrimPoint
 from sbs_msgs.srv import Linearize, Trim
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.linear_model import growing_rotor_modes_text
-from sbs_sim.analysis.linearize import linearize
-from sbs_sim.analysis.sweep import SweepPoint, sweep
-from sbs_sim.analysis.trim import trim
+from sbs_sim.analysis.linearize import linearize, linearize_trim
+from sbs_sim.analysis.sweep import SweepPoint, sweep_flights
+from sbs_sim.analysis.trim import solve_trim
 from sbs_sim.errors import SbsError
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.nodes.analysis_conversions import model_message, sweep_messages, trim_message
 from sbs_sim.nodes.component import Component
@@ -35,7 +36,6 @@ from sbs_sim.nodes.threaded_action import ThreadedActionServer
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
 }
-CONDITION = ("airspeed", "climb_rate", "sideslip", "turn_rate", "lead_lag", "cyclic_inflow", "azimuth_count")
 MAX_POINTS = 1000  # of a sweep; its result is one message, some 50 kB for each of them
 SWEEP_LOCK_TIMEOUT = 2.0  # s that a sweep waits for the end of the one before, which may just have been cancelled
 
@@ -81,7 +81,7 @@ class Analysis(Component):
 
     def _on_trim(self, request: Trim.Request, response: Trim.Response) -> Trim.Response:
         def act() -> None:
-            point = trim(self._aircraft, **_condition(request), method=request.method)
+            point = solve_trim(self._aircraft, *_flight(request), method=request.method)
             response.trim, response.warnings = trim_message(self._aircraft, point), point.warnings
             self._trim_point.publish(response.trim, self._now())
 
@@ -89,7 +89,8 @@ class Analysis(Component):
 
     def _on_linearize(self, request: Linearize.Request, response: Linearize.Response) -> Linearize.Response:
         def act() -> None:
-            model = linearize(self._aircraft, **_condition(request), method=request.method)
+            point = solve_trim(self._aircraft, *_flight(request))
+            model = linearize_trim(self._aircraft, point, method=request.method)
             response.model, response.warnings = model_message(self._aircraft, model), model.warnings
             self._linear_model.publish(response.model, self._now())
             if model.growing_rotor_modes:
@@ -132,14 +133,11 @@ class Analysis(Component):
         request = goal.request
         if len(request.values) > MAX_POINTS:
             raise SbsError(f"values: {len(request.values)} of them, allowed are 1 to {MAX_POINTS}")
-        condition = _condition(request)
-        if condition.get(request.parameter) == 0.0:  # what a request has that does not say it
-            del condition[request.parameter]
-        swept = sweep(
+        swept = sweep_flights(
             self._aircraft,
             request.parameter,
             request.values.tolist(),
-            **condition,
+            *_flight(request),
             linear=request.linear,
             workers=self._sweep_workers,
             progress=tell,
@@ -148,8 +146,10 @@ class Analysis(Component):
         return sweep_messages(self._aircraft, swept)
 
 
-def _condition(request: Any) -> dict[str, Any]:
-    return {name: getattr(request, name) for name in CONDITION}
+def _flight(request: Any) -> tuple[TrimCondition, Fidelity]:
+    """Flight condition and fidelity of a request."""
+    condition = TrimCondition(request.airspeed, request.climb_rate, request.sideslip, request.turn_rate)
+    return condition, Fidelity(request.lead_lag, request.cyclic_inflow, request.azimuth_count)
 
 
 def _feedback(point: SweepPoint, done: int, total: int) -> Sweep.Feedback:

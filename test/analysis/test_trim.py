@@ -11,7 +11,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.errors import TrimError
-from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
@@ -53,7 +53,7 @@ def disc_area(rotor):
 @pytest.mark.parametrize("name", ["hover", "oblique", "left turn in a climb"])
 def test_jacobian_of_the_equations_is_their_difference(sbs, name, fidelity):
     """All unknowns, away from the solution; as many azimuths as the Jacobian takes at most."""
-    problem, condition = TrimProblem(sbs, *fidelity, 4), TrimCondition(**CONDITIONS[name])
+    problem, condition = TrimProblem(sbs, Fidelity(*fidelity, 4)), TrimCondition(**CONDITIONS[name])
     guess = MomentumTheory(problem).guess(condition)
     unknowns = guess + 0.02 * np.random.default_rng(1).standard_normal(len(guess))
     found, step = problem.jacobian(condition, unknowns), 1e-6

@@ -15,7 +15,7 @@ from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.trim_search import STALLED, _Search
 from sbs_sim.errors import TrimError
-from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition
 from sbs_sim.model import state as S
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -67,7 +67,7 @@ def uh60a():
 def test_the_first_guess_is_a_hover_but_for_details(name):
     """Twist, mixing, shafts, torques and arms are in it: a quarter of a degree, 2 % of thrust and 4 % of torque."""
     aircraft = AIRCRAFT[name]()
-    theory, point = MomentumTheory(TrimProblem(aircraft, True, True, 12)), trim(aircraft)
+    theory, point = MomentumTheory(TrimProblem(aircraft, Fidelity())), trim(aircraft)
     guess, found = theory.guess(HOVER), theory.balance(HOVER)
     expected = np.concatenate([[point.pitch, point.roll], point.controls])
     np.testing.assert_allclose(np.degrees(guess[:6]), np.degrees(expected), atol=0.25)
@@ -88,7 +88,7 @@ def test_the_first_guess_of_a_forward_flight_is_near_it(name, flight):
     """At a twelfth of the tip speed: attitude and collectives to 2 deg, thrusts and inflow to a tenth."""
     aircraft = AIRCRAFT[name]()
     flight = {"airspeed": aircraft.rotors[0].speed * aircraft.rotors[0].radius / 12, **flight}
-    theory, point = MomentumTheory(TrimProblem(aircraft, True, True, 12)), trim(aircraft, **flight)
+    theory, point = MomentumTheory(TrimProblem(aircraft, Fidelity())), trim(aircraft, **flight)
     found = theory.balance(TrimCondition(**flight))
     assert np.degrees([found.pitch, found.roll]) == pytest.approx(np.degrees([point.pitch, point.roll]), abs=2.0)
     names = dict(zip(point.state_names, point.state, strict=True))
@@ -101,7 +101,7 @@ def test_the_first_guess_of_a_forward_flight_is_near_it(name, flight):
 
 def test_thrust_is_the_mean_lift_of_the_sections_over_the_azimuth(uh60a):
     """Of a twisted blade that moves along and through its disc, by quadrature; and so is the mean lift coefficient."""
-    theory, rotor = MomentumTheory(TrimProblem(uh60a, True, True, 12)).rotors[0], uh60a.rotors[0]
+    theory, rotor = MomentumTheory(TrimProblem(uh60a, Fidelity())).rotors[0], uh60a.rotors[0]
     velocity = 25.0 * np.array([1.0, 0.4, 0.0])
     theory.meet(velocity)
     thrust, inflow = 70000.0, 0.02
@@ -127,7 +127,7 @@ def test_thrust_is_the_mean_lift_of_the_sections_over_the_azimuth(uh60a):
 def test_induced_velocity_has_the_closed_forms(density):
     """Hover, climb, descent against the thrust, and edgewise flight at speed (Leishman 2.8, 2.13, 2.14)."""
     aircraft = build(environment={"air_density": density})
-    theory = MomentumTheory(TrimProblem(aircraft, True, True, 12))
+    theory = MomentumTheory(TrimProblem(aircraft, Fidelity()))
     rotor, thrust = theory.rotors[0], 101.0
     hover = math.sqrt(thrust / (2 * density * math.pi * aircraft.rotors[0].radius ** 2))
     for axial in (0.0, 3.0, -1.0, -30.0):
@@ -145,7 +145,7 @@ def test_induced_velocity_has_the_closed_forms(density):
 
 def test_slopes_of_a_rotor_are_its_differences(uh60a):
     """Thrust and torque by collective, tilts by both cyclics, as the rotor moves along its disc."""
-    rotor = MomentumTheory(TrimProblem(uh60a, True, True, 12)).rotors[1]  # with pitch-flap coupling
+    rotor = MomentumTheory(TrimProblem(uh60a, Fidelity())).rotors[1]  # with pitch-flap coupling
     rotor.meet(np.array([20.0, 3.0, -2.0]))
     swash, step = [0.3, 0.02, -0.03], 1e-6
 
@@ -166,7 +166,7 @@ def test_slopes_of_a_rotor_are_its_differences(uh60a):
 
 def test_stall_is_told_from_attached_flow(sbs):
     """At 20 m/s down the same thrust comes from 3.4 deg of collective, and from 80 deg with all sections stalled."""
-    problem = TrimProblem(sbs, True, True, 12)
+    problem = TrimProblem(sbs, Fidelity())
     theory, condition = MomentumTheory(problem), TrimCondition(climb_rate=-20.0)
     for guess, stalled in (([math.radians(3.0), 0, 0, 0], False), ([math.radians(75.0), 0, 0, 0], True)):
         point = trim(sbs, climb_rate=-20.0, guess=guess)
@@ -349,7 +349,7 @@ WAYS = {
 def test_every_way_by_itself_leads_to_the_flight(name):
     make, flight, way = WAYS[name]
     aircraft = make()
-    search = _Search(TrimProblem(aircraft, True, True, 12), TrimCondition(**flight))
+    search = _Search(TrimProblem(aircraft, Fidelity()), TrimCondition(**flight))
     if way == "_along_path":
         search._from_hover()
     found, point = getattr(search, way)(), trim(aircraft, **flight)
@@ -358,7 +358,7 @@ def test_every_way_by_itself_leads_to_the_flight(name):
 
 def test_level_flight_is_looked_for_where_there_is_nothing_slower(sbs):
     """A hover has no share of its speed: flights at 2.5 hover inflow velocities lie beside those at 0.8 and 1.3."""
-    problem = TrimProblem(sbs, True, True, 12)
+    problem = TrimProblem(sbs, Fidelity())
     induced = math.sqrt(sbs.body.mass * G / (2 * RHO * 2 * math.pi * sbs.rotors[0].radius ** 2))
     (level,) = _Search(problem, TrimCondition())._other_speeds()
     assert astuple(level) == pytest.approx((2.5 * induced, 0.0, 0.0, 0.0))
@@ -495,7 +495,7 @@ def test_what_no_weight_makes_possible_is_told_by_momentum_theory(uh60a):
 
 
 def test_every_equation_has_words(sbs):
-    problem = TrimProblem(sbs, True, True, 12)
+    problem = TrimProblem(sbs, Fidelity())
     words = [problem.balance(row) for row in np.eye(len(problem.equations))]
     body = ["force ahead", "force to the right", "vertical force", "rolling moment", "pitching moment", "yawing moment"]
     assert words[:6] == body

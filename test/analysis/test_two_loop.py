@@ -15,7 +15,7 @@ from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.two_loop import solve_by_two_loops
 from sbs_sim.errors import TrimError
-from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import state as S
 from sbs_sim.model.steady import steady_balance
@@ -290,7 +290,7 @@ def test_newton_finds_what_the_loops_do_not(sbs):
 
 def test_outer_loop_drives_away_from_a_hover_that_is_not_symmetric(sbs, hover):
     """From the trim itself with a thousandth of a radian of lateral cyclic: each turn multiplies it by some -5."""
-    problem = TrimProblem(sbs, True, True, 12)
+    problem = TrimProblem(sbs, Fidelity())
     start = np.concatenate([[hover.pitch, hover.roll], hover.controls, np.zeros(len(problem.equations) - 6)])
     x = trimmed_state(sbs, hover)
     start[problem.coordinates] = np.concatenate([np.r_[x[sbs.layout.flap(j)], x[sbs.layout.lag(j)]] for j in range(2)])
@@ -336,7 +336,7 @@ def test_what_cannot_hover_is_a_failure():
 
 
 def test_numbers_that_are_not_finite_are_a_failure(sbs):
-    problem = TrimProblem(sbs, True, True, 12)
+    problem = TrimProblem(sbs, Fidelity())
     start = MomentumTheory(problem).guess(TrimCondition())
     start[2] = math.nan
     with pytest.raises(TrimError) as error:

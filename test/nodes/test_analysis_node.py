@@ -434,7 +434,7 @@ def test_an_error_of_ours_is_told_and_ends_nothing(monkeypatch, aircraft):
     flight = Simulation(aircraft, trimmed_state(aircraft, trim(aircraft)), trim(aircraft).swashplate)
     node = analysis.Analysis(FlightLoop(flight))
     try:
-        monkeypatch.setattr(analysis, "linearize", broken)
+        monkeypatch.setattr(analysis, "linearize_trim", broken)
         answer = node._on_linearize(Linearize.Request(), Linearize.Response())
         assert not answer.success
         assert answer.message == "internal error, see the log: RuntimeError('nobody thought of this')"

@@ -34,7 +34,7 @@ from sbs_sim.analysis.trim_guess import MomentumTheory  # noqa: E402
 from sbs_sim.analysis.trim_problem import TrimProblem  # noqa: E402
 from sbs_sim.analysis.trim_search import STALLED  # noqa: E402
 from sbs_sim.errors import TrimError  # noqa: E402
-from sbs_sim.flight.trim_point import TrimCondition, TrimPoint  # noqa: E402
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint  # noqa: E402
 
 SOLVED = 1e-8  # largest scaled residual of a trim
 LARGEST_UNKNOWN = 1.3  # rad; bounds of the least squares
@@ -131,7 +131,7 @@ class Other:
     def __init__(
         self, aircraft: Aircraft, condition: TrimCondition, seed: tuple[int, ...], starts: int, seconds: float
     ) -> None:
-        self._problem, self._condition = TrimProblem(aircraft, True, True, 12), condition
+        self._problem, self._condition = TrimProblem(aircraft, Fidelity()), condition
         self._rng, self._starts, self._seconds = np.random.default_rng(seed), starts, seconds
 
     def search(self) -> np.ndarray | None:

@@ -327,10 +327,12 @@ frames of its arguments.
 LAYERS = {
     "Library": ("sbs_sim",),
     "Aircraft": ("sbs_sim.aircraft",),
+    "Flights": ("sbs_sim.flight",),
     "Analysis": ("sbs_sim.analysis",),
     "Recordings": ("sbs_sim.recording",),
     "Pilots": ("sbs_sim.pilot",),
     "Model": ("sbs_sim.model",),
+    "Concurrency, terminal, output": ("sbs_sim.concurrency", "sbs_sim.terminal", "sbs_sim.output"),
 }
 
 

@@ -1,1 +1,1 @@
-"""Trim of the model: the Python API and the bodies of the services."""
+"""Trims, linear models, sweeps and batches of flights."""

@@ -43,7 +43,7 @@ FIDELITY = ("lead_lag", "cyclic_inflow")
 TRIM_ARGUMENTS = tuple(list(inspect.signature(trim).parameters)[1:])  # but the aircraft
 CANCELLED = "cancelled"
 MEMORY = 4e9  # bytes
-MOST_TICKS = 10**10  # of the longest flight with the shortest tick
+MAX_TICKS = 10**10  # of the longest flight with the shortest tick
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class Batch(ByContent):
         What was asked for, by name, each with the shape (n_flights, n_rows, ...); see `simulate_batch`.
     errors : tuple of str or None
         Of each flight, why it ended early or did not begin, in one line; None for a whole flight. "cancelled" for
-        what was not begun.
+        what was not started.
     warnings : tuple of tuple of str
         Of each flight, where the model does not hold and what actuators would not do, see
         `sbs_sim.flight.history.History`.
@@ -185,7 +185,7 @@ def simulate_batch(
         Called with the number of a flight, the number of flights done and that of all, in the calling thread, as
         each ends.
     cancelled : callable, optional
-        Asked several times a second; after a True no further flight is begun, and the rest has the error "cancelled".
+        Asked several times a second; after a True no further flight is started, and the rest has the error "cancelled".
     dask : str or distributed.Client, optional
         See `sbs_sim.sweep`.
     memory : float
@@ -210,11 +210,11 @@ def simulate_batch(
     memory = checks.number("memory", memory, 0.0, 1e15, "bytes", BatchError)
     histories = _memory(cases, plan.outputs, rows, names, memory)
     errors: list[str | None] = [CANCELLED] * len(cases)
-    told: list[tuple[str, ...]] = [()] * len(cases)
+    warnings: list[tuple[str, ...]] = [()] * len(cases)
     done = itertools.count(1)
 
     def keep(i: int, result: Result) -> None:
-        flown, errors[i], told[i] = result
+        flown, errors[i], warnings[i] = result
         _fill(histories, i, flown, cases[i].aircraft.layout.names, names)
         if progress is not None:
             progress(i, next(done), len(cases))
@@ -228,7 +228,7 @@ def simulate_batch(
 
     compute(_fly, calls, keep_all, workers=count, cancelled=cancelled, dask=dask)
     time = np.multiply(np.arange(rows) * plan.every, plan.options["tick"], dtype=float)
-    return Batch(tuple(cases), time, names, histories, tuple(errors), tuple(told))
+    return Batch(tuple(cases), time, names, histories, tuple(errors), tuple(warnings))
 
 
 def _plan(cases: Sequence[Case], duration: float, every: int, outputs: Sequence[str], options: dict[str, Any]) -> Plan:
@@ -236,7 +236,7 @@ def _plan(cases: Sequence[Case], duration: float, every: int, outputs: Sequence[
     _check_cases(cases)
     duration = checks.number("duration", duration, 0.0, 1e6, "s", BatchError)
     options["tick"] = checks.number("tick", options["tick"], 1e-4, 1.0, "s", BatchError)
-    every = checks.whole("every", every, 1, MOST_TICKS, BatchError)
+    every = checks.whole("every", every, 1, MAX_TICKS, BatchError)
     allowed = ("tick", "azimuth_step", "method", "ground_altitude", "actuators", *FIDELITY)
     unknown = [name for name in options if name not in allowed]
     if unknown:

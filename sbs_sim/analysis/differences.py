@@ -39,7 +39,7 @@ def _state_step(name: str) -> float:
 
 
 def used_states(point: TrimPoint) -> NDArray[np.int64]:
-    """Places in the linear state of those that the fidelity of a trim has."""
+    """Indices in the linear state of those that the fidelity of a trim has."""
     parts = [S.part_of(name) for name in point.state_names]
     used = [
         i

@@ -1,6 +1,6 @@
 """Trims and linear models as files and for other programs: .npz, .mat, .json, python-control.
 
-Names and places are those of `TrimPoint` and `LinearModel`, SI units and radians; poles, modes and blocks come along.
+Names and order are those of `TrimPoint` and `LinearModel`, SI units and radians; poles, modes and blocks come along.
 """
 
 import csv

@@ -23,7 +23,7 @@ from sbs_sim.flight.trim_point import TrimPoint
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-MOST_PASSAGES = 60  # of any rotor in one common period
+MAX_PASSAGES = 60  # of any rotor in one common period
 AZIMUTH_COUNTS = (8, 1000)
 TAYLOR_DEGREE, TAYLOR_REACH = 12, 0.4  # a multiple of three; 1-norm
 
@@ -108,12 +108,12 @@ def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
     blades = np.array([rotor.blades for rotor in aircraft.rotors])
     each = np.where(blades % 2 == 0, 2, 1)
     passage = each * 2.0 * math.pi / (blades * np.array([rotor.speed for rotor in aircraft.rotors]))
-    for count in range(1, MOST_PASSAGES + 1):
+    for count in range(1, MAX_PASSAGES + 1):
         period = count * float(passage.max())
         numbers = np.round(period / passage)
         if np.all(np.abs(numbers * passage - period) < 1e-9 * period):
             return period, [int(number) for number in numbers * each]
-    raise LinearizationError(f"the blade passages of the rotors have no common period of up to {MOST_PASSAGES} of them")
+    raise LinearizationError(f"the blade passages of the rotors have no common period of up to {MAX_PASSAGES} of them")
 
 
 def _transition(a: Array, period: float) -> Array:

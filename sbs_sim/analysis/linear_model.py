@@ -238,14 +238,14 @@ def growing_rotor_modes_text(model: LinearModel, aircraft: Aircraft) -> str:
 
 
 def settle(a: Array, b: Array, slow: Sequence[int]) -> tuple[Array, Array, Array, Array]:
-    """Take it that all states but the slow ones have settled (theory.md eq. 9.3).
+    """Quasi-static reduction: all states but the slow ones have settled (theory.md eq. 9.3).
 
     Parameters
     ----------
     a : ndarray, shape (n, n)
     b : ndarray, shape (n, m)
     slow : sequence of int
-        Places of the s states that are kept, in the order of the result.
+        Indices of the s states that are kept, in the order of the result.
 
     Returns
     -------

@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 
 OUTPUTS = ("state", "power")  # of a batch, that `quantities` needs
 SHARES = (5.0, 25.0, 50.0, 75.0, 95.0)  # per cent
-MOST_FLIGHTS = 1_000_000
-LEAST_AIRSPEED = 5.0  # m/s, at which the field passes in hover
+MAX_FLIGHTS = 1_000_000
+MIN_AIRSPEED = 5.0  # m/s, at which the field passes in hover
 
 
 def gust_cases(
@@ -69,7 +69,7 @@ def gust_cases(
     """
     checks.instance("aircraft", aircraft, Aircraft, BatchError)
     checks.instance("condition", condition, Mapping, BatchError)
-    flights = checks.whole("flights", flights, 1, MOST_FLIGHTS, BatchError)
+    flights = checks.whole("flights", flights, 1, MAX_FLIGHTS, BatchError)
     seed = checks.whole("seed", seed, 0, 2**64 - 1, BatchError)
     spread = {} if spread is None else spread
     checks.instance("spread", spread, Mapping, BatchError)
@@ -82,7 +82,7 @@ def gust_cases(
         wind = Wind(
             turbulence_intensity=(turbulence, turbulence, turbulence),
             turbulence_length=length,
-            turbulence_airspeed=max(abs(airspeed), LEAST_AIRSPEED),
+            turbulence_airspeed=max(abs(airspeed), MIN_AIRSPEED),
             turbulence_direction=condition.get("sideslip", 0.0),
             turbulence_seed=source.random_raw() >> 1,
         )
@@ -154,6 +154,6 @@ def batch_to_csv(batch: Batch) -> str:
         last = [batch.time[end], *(values[i, end] for values in flown.values())] if end >= 0 else []
         numbers = [*(case.changes[path] for path in paths), *last]
         cells = [repr(float(number)) for number in numbers] + [""] * (1 + len(flown) - len(last))
-        told = "; ".join(batch.warnings[i])
-        writer.writerow([i, case.wind.turbulence_seed, *cells, told, batch.errors[i] or ""])
+        warnings = "; ".join(batch.warnings[i])
+        writer.writerow([i, case.wind.turbulence_seed, *cells, warnings, batch.errors[i] or ""])
     return file.getvalue()

@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 Equations = Callable[[Array], Array]
 
 TOLERANCE = 1e-11  # of the largest residual, which is to be scaled to the order of one
-MOST_ITERATIONS = 30
+MAX_ITERATIONS = 30
 DIFFERENCE_STEP = 1e-6
 GOOD_ENOUGH = 0.1  # a step that leaves less of the residual is followed by another with the same Jacobian
 OPEN = 1e-10  # of the largest singular value: directions in which differences of 1e-6 cannot see a slope
-LARGEST_UNKNOWN = math.pi / 2  # angles and inflow ratios beyond it make no sense
+MAX_UNKNOWN = math.pi / 2  # angles and inflow ratios beyond it make no sense
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ def newton(equations: Equations, start: Array, jacobian: Equations | None = None
     """
     slope = jacobian or (lambda values: _jacobian(equations, values))
     values, residual, matrix = start, equations(start), None
-    for iteration in range(MOST_ITERATIONS):
+    for iteration in range(MAX_ITERATIONS):
         interruption.look()
         size = float(np.abs(residual).max())
         if size < TOLERANCE:
@@ -86,7 +86,7 @@ def _step(matrix: Array, residual: Array) -> Array:
     """Newton's step; the smallest of all where the equations leave a direction open, which then moves nothing."""
     try:
         step = solve(matrix, residual)
-        if np.abs(step).max() < LARGEST_UNKNOWN or not np.isfinite(matrix).all():
+        if np.abs(step).max() < MAX_UNKNOWN or not np.isfinite(matrix).all():
             return step
     except np.linalg.LinAlgError:
         pass
@@ -111,7 +111,7 @@ def _descend(
     size = length(residual)
     for halving in range(halvings):
         candidate = values - step / 2**halving
-        if np.abs(candidate).max() < LARGEST_UNKNOWN:
+        if np.abs(candidate).max() < MAX_UNKNOWN:
             new = equations(candidate)
             if length(new) < size:  # false for a NaN as well
                 return candidate, new

@@ -96,7 +96,7 @@ class _TaylorTerms:
         self._at_trim = [self._coupling(j, point.state[self._places(j)[0]]) for j in range(len(aircraft.rotors))]
 
     def _places(self, rotor: int) -> list[slice]:
-        """Places of one rotor's flap, flap rates, lag, lag rates in the linear state."""
+        """Indices of one rotor's flap, flap rates, lag, lag rates in the linear state."""
         shift = S.LINEAR_BODY_SIZE - S.BODY_SIZE
         found = (self.layout.flap, self.layout.flap_rate, self.layout.lag, self.layout.lag_rate)
         return [slice(where(rotor).start + shift, where(rotor).stop + shift) for where in found]

@@ -44,7 +44,7 @@ STYLE: dict[Any, Any] = {
 FORMATS = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}  # and what they do not tell
 DOTS_PER_INCH = 160
 WIDE, HALF = 7.0, 3.45  # inches
-LEAST_ANGLE = 2.0  # deg that an axis covers
+MIN_ANGLE = 2.0  # deg that an axis covers
 BLUE, ORANGE, GREEN, INK, GRID = "#0072B2", "#E69F00", "#009E73", "#1a1a1a", "#dddddd"
 
 LABELS = {
@@ -163,9 +163,9 @@ def _trim_figure(report: Report, quantities: Mapping[str, str], height: float) -
             _trim_curve(axes, report.flights[name].values, curve, key, name)
         axes.set_ylabel(label)
         low, high = axes.get_ylim()
-        if high - low < LEAST_ANGLE:  # or rounding would fill the panel
+        if high - low < MIN_ANGLE:  # or rounding would fill the panel
             middle = round((low + high) / 2, 3)
-            axes.set_ylim(middle - 0.55 * LEAST_ANGLE, middle + 0.55 * LEAST_ANGLE)
+            axes.set_ylim(middle - 0.55 * MIN_ANGLE, middle + 0.55 * MIN_ANGLE)
         _grid(axes)
     for axes in panels[-1]:
         axes.set_xlabel("airspeed [m/s]")

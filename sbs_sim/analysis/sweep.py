@@ -59,7 +59,7 @@ class SweepPoint:
     model : LinearModel or None
         None where there is no trim, and where linear models were not asked for.
     error : str or None
-        Why something is missing, in one line; "cancelled" for what was not begun.
+        Why something is missing, in one line; "cancelled" for what was not started.
     """
 
     value: float
@@ -244,7 +244,7 @@ def sweep(
     progress : callable, optional
         Called with the point, the number of points done and that of all, in the calling thread, as each ends.
     cancelled : callable, optional
-        Asked several times a second; after a True no further point is begun, and the rest has the error "cancelled".
+        Asked several times a second; after a True no further point is started, and the rest has the error "cancelled".
     dask : str or distributed.Client, optional
         Address of the scheduler of a dask cluster, "tcp://HOST:PORT", or a client: its workers solve the points in
         place of threads. The results are the same; workers with other versions are refused, and what a lost worker

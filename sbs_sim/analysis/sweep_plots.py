@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 FORMATS = ("png", "svg")
 DOTS_PER_INCH = 150
-LEAST_ANGLE, LEAST_SHARE = 1.0, 0.05  # that an axis covers: deg, share of the largest value
+MIN_ANGLE, MIN_SHARE = 1.0, 0.05  # that an axis covers: deg, share of the largest value
 
 
 def save_plots(sweep: Sweep, folder: str | Path) -> list[Path]:
@@ -94,16 +94,14 @@ def trim_figure(sweep: Sweep) -> Figure:
     figure = Figure(figsize=(10.0, 7.5), layout="constrained")
     FigureCanvasAgg(figure)
     (attitude, controls), (thrust, power) = figure.subplots(2, 2)
-    _curves(
-        attitude, sweep, {name: np.degrees(sweep[name]) for name in ("pitch", "roll")}, "attitude [deg]", LEAST_ANGLE
-    )
+    _curves(attitude, sweep, {name: np.degrees(sweep[name]) for name in ("pitch", "roll")}, "attitude [deg]", MIN_ANGLE)
     angles = {name.replace("_", " "): np.degrees(sweep[name]) for name in CONTROL_NAMES}
-    _curves(controls, sweep, angles, "pilot controls [deg]", LEAST_ANGLE)
-    _curves(thrust, sweep, _by_rotor(sweep["thrust"]), "thrust [N]", LEAST_SHARE * _largest(sweep["thrust"]))
+    _curves(controls, sweep, angles, "pilot controls [deg]", MIN_ANGLE)
+    _curves(thrust, sweep, _by_rotor(sweep["thrust"]), "thrust [N]", MIN_SHARE * _largest(sweep["thrust"]))
     powers = _by_rotor(sweep["power"])
     if len(powers) > 1:
         powers["all rotors"] = sweep["power"].sum(axis=1)
-    _curves(power, sweep, powers, "shaft power [W]", LEAST_SHARE * _largest(sweep["power"]))
+    _curves(power, sweep, powers, "shaft power [W]", MIN_SHARE * _largest(sweep["power"]))
     return figure
 
 

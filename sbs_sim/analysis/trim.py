@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.newton import LARGEST_UNKNOWN
+from sbs_sim.analysis.newton import MAX_UNKNOWN
 from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.trim_search import find
@@ -134,7 +134,7 @@ def _angles(what: str, values: ArrayLike, names: tuple[str, ...], checked: tuple
         raise TrimError(f"{what} has the shape {found.shape}: allowed are {len(names)} numbers, {names[0]} the first")
     for name, value in zip(names, found.tolist(), strict=True):
         if name in checked:
-            checks.number(f"{what}: {name}", value, -LARGEST_UNKNOWN, LARGEST_UNKNOWN, "rad", TrimError)
+            checks.number(f"{what}: {name}", value, -MAX_UNKNOWN, MAX_UNKNOWN, "rad", TrimError)
     return found
 
 

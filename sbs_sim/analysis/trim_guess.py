@@ -27,18 +27,18 @@ from sbs_sim.model.solve import smallest
 Array = NDArray[np.float64]
 
 LIFT_ANGLE = math.radians(6.0)  # the lift curve is straight through its points at zero and at this angle of attack
-LEAST_SLOPE = 1.0  # 1/rad, of a lift curve; that of thin airfoils is 2 pi
-LEAST_LOADING = 0.01  # of the mean disc loading: a rotor with less has the flow of this, for without any Newton is lost
-MOST_STEPS, MOST_MOMENTUM_STEPS = 12, 20
+MIN_SLOPE = 1.0  # 1/rad, of a lift curve; that of thin airfoils is 2 pi
+MIN_LOADING = 0.01  # of the mean disc loading: a rotor with less has the flow of this, for without any Newton is lost
+MAX_STEPS, MAX_MOMENTUM_STEPS = 12, 20
 TOLERANCE = 1e-3  # of the weight, and rad: what follows is Newton's
 DIGITS = 9  # decimal places of a guess
-LARGEST_STEP = 0.15  # rad, of a control, but for the first step, which goes all the way to the wanted thrust
+MAX_STEP = 0.15  # rad, of a control, but for the first step, which goes all the way to the wanted thrust
 THRUST_STEP = 4.0  # a rotor that carries gets no more than this times its thrust in a step, and no less than its part
 WEAKEST = 1e-3  # of the strongest effect of the controls: directions with less are left to Newton
 CARRIES = 0.2  # of the mean thrust: a rotor with more is one that carries
-LARGEST_LEAN, LARGEST_FLAP, LARGEST_LAG = 0.9, 0.2, 0.3  # sine of pitch and of roll beside the bank; rad
-LARGEST_INFLOW = 30.0  # m/s
-LEAST_GRAVITY, LEAST_UPWARD = 1e-3, 0.03  # m/s^2; cosine of the shafts: what is divided by is never zero
+MAX_LEAN, MAX_FLAP, MAX_LAG = 0.9, 0.2, 0.3  # sine of pitch and of roll beside the bank; rad
+MAX_INFLOW = 30.0  # m/s
+MIN_GRAVITY, MIN_UPWARD = 1e-3, 0.03  # m/s^2; cosine of the shafts: what is divided by is never zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +161,7 @@ class MomentumRotor:
         sign, hover2 = math.copysign(1.0, thrust), abs(thrust) / self._mass_flow
         climb = sign * self._axial
         v = math.sqrt(hover2) + max(0.0, -climb)
-        for _ in range(MOST_MOMENTUM_STEPS):
+        for _ in range(MAX_MOMENTUM_STEPS):
             flow = math.hypot(self._edgewise, v + climb)
             slope = flow + v * (v + climb) / flow
             change = (hover2 - v * flow) / slope
@@ -269,8 +269,8 @@ class MomentumTheory:
             return self._problem.unknowns(0.0, 0.0, np.zeros(len(S.CONTROL_NAMES)), x)
         found = self.balance(condition, share, controls)
         for j, rotor in enumerate(found.rotors):
-            x[layout.flap(j)][:3] = [_clipped(angle, LARGEST_FLAP) for angle in rotor.flap]
-            x[layout.lag(j).start] = _clipped(rotor.lag, LARGEST_LAG)
+            x[layout.flap(j)][:3] = [_clipped(angle, MAX_FLAP) for angle in rotor.flap]
+            x[layout.lag(j).start] = _clipped(rotor.lag, MAX_LAG)
             x[layout.inflow(j).start] = rotor.inflow
         # rounded, so that no last bit of the libraries' sines and sums is in where a trim begins
         return np.round(self._problem.unknowns(found.pitch, found.roll, found.controls, x), DIGITS)
@@ -287,18 +287,18 @@ class MomentumTheory:
             Controls [rad] that are to stay: what the rotors do with them is told, whether it balances or not.
         """
         search = _Search(self, condition, share, controls)
-        for _ in range(MOST_STEPS):
+        for _ in range(MAX_STEPS):
             if search.step() < TOLERANCE:
                 break
         return search.found()
 
     @property
     def hover_inflow(self) -> float:
-        """Induced velocity that carries the weight in hover [m/s], no more than LARGEST_INFLOW."""
+        """Induced velocity that carries the weight in hover [m/s], no more than MAX_INFLOW."""
         air = self.aircraft.environment
         area = sum(rotor.area * rotor.upward for rotor in self.rotors)
         momentum = 2.0 * max(air.air_density, MIN_DENSITY) * max(area, MIN_DENSITY)
-        return min(LARGEST_INFLOW, math.sqrt(self.aircraft.body.mass * air.gravity / momentum))
+        return min(MAX_INFLOW, math.sqrt(self.aircraft.body.mass * air.gravity / momentum))
 
     def lift(self, condition: TrimCondition) -> Array:
         """Change of the controls, shape (4,), that gives lift and no moments: 1 rad on the collective it moves most."""
@@ -332,17 +332,17 @@ class _Search:
         self._rotors, self._condition, self._fixed = theory.rotors, condition, controls is not None
         self._plates = 0.5 * air.air_density * share * body.flat_plate_areas
         centripetal = condition.airspeed * condition.turn_rate
-        self._bank = math.atan2(centripetal, max(share * air.gravity, LEAST_GRAVITY))
-        self._weight = body.mass * max(math.hypot(share * air.gravity, centripetal), LEAST_GRAVITY)
+        self._bank = math.atan2(centripetal, max(share * air.gravity, MIN_GRAVITY))
+        self._weight = body.mass * max(math.hypot(share * air.gravity, centripetal), MIN_GRAVITY)
         radius = max(rotor.radius for rotor in theory.aircraft.rotors)
         self._scale = 1.0 / (self._weight * np.array([1.0, radius, radius, radius]))
         self._pitch, self._roll = 0.0, self._bank
         self._controls = np.zeros(len(S.CONTROL_NAMES)) if controls is None else controls
         self._authority = np.zeros((4, len(self._controls)))
         lifting = sum(rotor.upward**2 * rotor.area for rotor in self._rotors)
-        loading = self._weight / max(lifting, LEAST_UPWARD**2 * sum(rotor.area for rotor in self._rotors))
-        self._least = [LEAST_LOADING * loading * rotor.area for rotor in self._rotors]
-        self._thrusts = [max(rotor.upward, LEAST_LOADING) * loading * rotor.area for rotor in self._rotors]
+        loading = self._weight / max(lifting, MIN_UPWARD**2 * sum(rotor.area for rotor in self._rotors))
+        self._least = [MIN_LOADING * loading * rotor.area for rotor in self._rotors]
+        self._thrusts = [max(rotor.upward, MIN_LOADING) * loading * rotor.area for rotor in self._rotors]
         self._first = True
         self._responses: list[Response] = []
         self._moves, self._velocity = condition.is_motion, np.zeros(3)
@@ -389,11 +389,11 @@ class _Search:
         wanted = -left[2:] * self._scale
         change = smallest(self._authority, wanted, WEAKEST)
         most = float(np.abs(change).max())
-        return change if self._first or most <= LARGEST_STEP else change * (LARGEST_STEP / most)
+        return change if self._first or most <= MAX_STEP else change * (MAX_STEP / most)
 
     def _tilt(self, force: Array) -> None:
         """Attitude in which the force of rotors and drag opposes weight and centripetal acceleration."""
-        ahead, right = (_clipped(part, LARGEST_LEAN) for part in (force[:2] / self._weight).tolist())
+        ahead, right = (_clipped(part, MAX_LEAN) for part in (force[:2] / self._weight).tolist())
         self._pitch, self._roll = math.asin(ahead), self._bank - math.asin(right)
 
     def _next_thrust(self, rotor: MomentumRotor, response: Response) -> float:
@@ -405,7 +405,7 @@ class _Search:
         return goal or thrust / THRUST_STEP  # an induced velocity of zero has no slope
 
     def found(self) -> Balance:
-        """Where the last step has begun, with the controls to which it has led."""
+        """Where the last step started, with the controls to which it has led."""
         return Balance(self._pitch, self._roll, self._controls, self._authority, tuple(self._responses))
 
 
@@ -419,4 +419,4 @@ def _lift_curve(table: AirfoilTable, reynolds: float) -> tuple[float, float, flo
     zero = len(table.alpha) // 2
     count = max(1, round(LIFT_ANGLE / float(table.alpha[zero + 1])))
     low, high = float(table.cl[row, zero]), float(table.cl[row, zero + count])
-    return max((high - low) / float(table.alpha[zero + count]), LEAST_SLOPE), low, float(table.cd[row, zero + count])
+    return max((high - low) / float(table.alpha[zero + count]), MIN_SLOPE), low, float(table.cd[row, zero + count])

@@ -48,11 +48,11 @@ class TrimProblem:
     Attributes
     ----------
     equations : ndarray of int64, shape (n,)
-        Places of the equations in the rate of the simulation state.
+        Indices of the equations in the rate of the simulation state.
     scales : ndarray, shape (n,)
         What each is divided by: gravity [m/s^2], Omega^2 [1/s^2], Omega [1/s].
     coordinates, inflow : ndarray of int64
-        Places of flap and lag, and of inflow, among the unknowns and among the equations.
+        Indices of flap and lag, and of inflow, among the unknowns and among the equations.
     loads : ndarray, shape (n_rotors, records.LOAD_SIZE)
         Mean loads of the last residual.
     """
@@ -73,7 +73,7 @@ class TrimProblem:
         self.loads = np.zeros((len(aircraft.rotors), R.LOAD_SIZE))
 
     def _rotor_unknowns(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-        """Places of the unknown rotor states in the simulation state, of their equations in its rate; their rotors."""
+        """Indices of the unknown rotor states in the simulation state, of their equations in its rate; their rotors."""
         places: list[int] = []
         equations: list[int] = []
         owners: list[int] = []

@@ -1,4 +1,4 @@
-"""Where a trim is looked for, and what is told where there is none (theory.md section 8.2)."""
+"""Search for a trim, and the reason where there is none (theory.md section 8.2)."""
 
 import math
 from collections.abc import Callable
@@ -25,11 +25,11 @@ LIGHT = (0.3, 0.1, 0.03)  # of weight and drag: where paths on which they grow b
 FIRST_LOAD, SMALLEST_LOAD = 0.1, 0.005  # steps of theirs
 NEARLY = 0.9  # of weight and drag: with less at the end of such a path there is no trim close by
 OTHER_SPEEDS = (0.8, 1.3)  # of the one wanted
-LEAST_POWER = 2.5  # hover inflow velocities: about the speed for the least power
+MIN_POWER_SPEED = 2.5  # hover inflow velocities: about the speed for the least power
 MORE_COLLECTIVE = tuple(math.radians(angle) for angle in (1.0, 2.0, 3.0, 4.0, 6.0, 8.0))
 STALLED = math.radians(5.0)  # pitch beyond what the thrust would need without stall: of a rotor on a stalled branch
 STALLS = math.radians(0.6)  # of one that carries about as much as it can
-MOST_LIFT = 1.0  # mean lift coefficient, about what rotors have at most
+MAX_LIFT_COEFFICIENT = 1.0  # mean lift coefficient, about what rotors have at most
 NO_AUTHORITY = 1e-4  # of the strongest effect of the controls on lift and moments
 MOSTLY = 0.9  # share of one balance in what the controls do not change
 BALANCES = ("lift", "rolling moment", "pitching moment", "yawing moment")
@@ -211,7 +211,7 @@ class _Search:
 
     def _other_speeds(self) -> list[TrimCondition]:
         """Flights at shares of the speed, and level flight with little power for one that is slow."""
-        flight, level = self._condition, LEAST_POWER * self._theory.hover_inflow
+        flight, level = self._condition, MIN_POWER_SPEED * self._theory.hover_inflow
         speeds = [flight.scaled(share) for share in OTHER_SPEEDS] if flight.is_motion else []
         if abs(flight.airspeed) < 0.5 * level:
             speeds.append(TrimCondition(math.copysign(level, flight.airspeed), 0.0, flight.sideslip, 0.0))
@@ -247,7 +247,7 @@ class _Search:
     def _is_stalled(self, unknowns: Array) -> bool:
         return bool(np.abs(self._theory.stall(self._condition, unknowns)).max() > STALLED)
 
-    # --- what is told where there is none ---------------------------------------------------------------------------
+    # --- the reason where there is none ----------------------------------------------------------------------------
 
     def _failure(self) -> TrimError:
         """What stops the trim, in one line: what is missing, how far the paths lead, what is left."""
@@ -276,7 +276,7 @@ class _Search:
         takes = [
             f"a mean lift coefficient of {abs(lift):.2g} of {name}"
             for name, lift in lifts.items()
-            if abs(lift) > MOST_LIFT
+            if abs(lift) > MAX_LIFT_COEFFICIENT
         ]
         takes = takes or list(self._problem.beyond_limits(self._theory.guess(self._condition)))
         return [f"by momentum theory it takes {' and '.join(takes)}"] if takes else []

@@ -27,11 +27,11 @@ IntArray = NDArray[np.int64]
 TOLERANCE = 1e-6  # of both loops: largest change of an unknown, relative to its size or to SMALL
 SMALL = 0.01  # rad, or inflow over tip speed: what counts as the size of smaller unknowns
 RELAXATION = 0.5  # share of the way to the steady inflow
-MOST_OUTER, MOST_INNER = 30, 100
+MAX_OUTER_ITERATIONS, MAX_INNER_ITERATIONS = 30, 100
 GUESSED = 2  # outer iterations whose changes are those of the first guess: from then on they are to shrink
 # What the complete equations may leave where the loops come to rest. The balance of blades that do not vibrate is not
 # quite the mean of vibrating ones: 1.5e-3 at 15 m/s. The stalled flights at which the loops may end leave 8e-3 to 0.4.
-LARGEST_RESIDUAL = 3e-3
+MAX_RESIDUAL = 3e-3
 
 
 def solve_by_two_loops(problem: TrimProblem, condition: TrimCondition, start: Array) -> tuple[Array, int, int]:
@@ -91,9 +91,9 @@ class _TwoLoops:
             self._balance_body()
             if self.change < TOLERANCE:
                 break
-            if self.outer == MOST_OUTER:
+            if self.outer == MAX_OUTER_ITERATIONS:
                 raise self._failure("the outer loop does not end")
-        if not np.abs(self._problem.residual(self._condition, self.unknowns)).max() < LARGEST_RESIDUAL:
+        if not np.abs(self._problem.residual(self._condition, self.unknowns)).max() < MAX_RESIDUAL:
             raise self._failure("the loops come to rest off trim")
 
     def _settle_blades(self) -> None:
@@ -109,7 +109,7 @@ class _TwoLoops:
 
     def _balance_body(self) -> None:
         """(e) to (h): attitude, controls and inflow at held coordinates."""
-        for _ in range(MOST_INNER):
+        for _ in range(MAX_INNER_ITERATIONS):
             before = self.unknowns
             self.inner += 1
             self.unknowns = self._solved(self._mean_residual, self._body, "no controls balance the body")

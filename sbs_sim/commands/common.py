@@ -56,10 +56,10 @@ def _behave_on_a_terminal() -> None:
     signal.signal(signal.SIGINT, _leave)
     if signal.getsignal(signal.SIGINT) is _leave:
         # And by a thread: Python's own handlers wait for the end of compiled code, and of compiling.
-        told, tell = os.pipe()
-        os.set_blocking(tell, False)
-        signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
-        threading.Thread(target=_leave_when_told, args=(told,), name="interrupts", daemon=True).start()
+        reader, writer = os.pipe()
+        os.set_blocking(writer, False)
+        signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+        threading.Thread(target=_leave_on_interrupt, args=(reader,), name="interrupts", daemon=True).start()
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal may not know every character
@@ -69,9 +69,9 @@ def _leave(*_: Any) -> None:
     os._exit(INTERRUPTED)
 
 
-def _leave_when_told(told: int) -> None:
+def _leave_on_interrupt(reader: int) -> None:
     """Wait for the number of the signal, which the handler in C writes at once."""
-    while signal.SIGINT not in os.read(told, 16):
+    while signal.SIGINT not in os.read(reader, 16):
         pass
     _leave()
 

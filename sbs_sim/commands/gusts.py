@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 GUST_DELAY, AFTER_GUST = 1.0, 12.0  # s before a gust, and after it
 SETTLING = 10.0  # s, in which the integrals learn the steady wind; not in the figures
-LEAST_TURBULENCE_AIRSPEED = 1.0  # m/s at which the frozen field passes where there is no wind
+MIN_TURBULENCE_AIRSPEED = 1.0  # m/s at which the frozen field passes where there is no wind
 PLACE = ("north", "east", "down")
 LONGEST = 3600.0  # s
 
@@ -107,8 +107,8 @@ def _work(arguments: argparse.Namespace) -> None:
         for line in lines:
             print(f"{name}: {line if line.startswith('clipped') else f'{OUTSIDE}: {line}'}")
     if arguments.json:
-        told = {name: {**figures, "warnings": warnings[name]} for name, figures in results.items()}
-        write(arguments.json, to_json(told))
+        results_with_warnings = {name: {**figures, "warnings": warnings[name]} for name, figures in results.items()}
+        write(arguments.json, to_json(results_with_warnings))
 
 
 def _airs(arguments: argparse.Namespace) -> dict[str, tuple["Wind", float, float]]:
@@ -119,7 +119,7 @@ def _airs(arguments: argparse.Namespace) -> dict[str, tuple["Wind", float, float
         velocity=(-arguments.wind, 0.0, 0.0),
         turbulence_intensity=(arguments.turbulence,) * 3,
         turbulence_length=arguments.length,
-        turbulence_airspeed=max(abs(arguments.wind), LEAST_TURBULENCE_AIRSPEED),
+        turbulence_airspeed=max(abs(arguments.wind), MIN_TURBULENCE_AIRSPEED),
         turbulence_seed=arguments.seed,
     )
     airs = {f"turbulence {arguments.turbulence:g} m/s": (turbulence, SETTLING, arguments.duration)}

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from sbs_sim.analysis.modes import Mode
 
 LEADING = 3  # states named beside a mode
-LEAST_SHARE = 0.005  # of the participations that are listed
-LEAST_INSTANTS = 48  # of a period for the characteristic exponents
-LARGEST_STEP = 0.25  # rad of the fastest mode
+MIN_SHARE = 0.005  # of the participations that are listed
+MIN_INSTANTS = 48  # of a period for the characteristic exponents
+MAX_STEP = 0.25  # rad of the fastest mode
 ROUNDING = 1e-13  # of a multiplier: what decays further in a period leaves no exponent
 COLUMNS = 10  # of a matrix side by side
 
@@ -146,11 +146,11 @@ def _seconds(time: float) -> str:
 def _shares(model: "LinearModel", mode: "Mode") -> list[tuple[str, float]]:
     """States and their shares in a mode, the largest first, without those of next to nothing."""
     shares = zip(model.state_names, map(float, mode.participation), strict=True)
-    return sorted(((name, share) for name, share in shares if share >= LEAST_SHARE), key=lambda item: -item[1])
+    return sorted(((name, share) for name, share in shares if share >= MIN_SHARE), key=lambda item: -item[1])
 
 
 def _print_participation(model: "LinearModel") -> None:
-    print(f"\nparticipation of the states, from {LEAST_SHARE:.1%}")
+    print(f"\nparticipation of the states, from {MIN_SHARE:.1%}")
     width = max(len(mode.name) for mode in model.modes)
     for mode in model.modes:
         print(f"{mode.name.ljust(width)}  {', '.join(f'{name} {share:.1%}' for name, share in _shares(model, mode))}")
@@ -161,8 +161,8 @@ def _azimuth_count(craft: "Aircraft", model: "LinearModel") -> int:
     from sbs_sim.analysis.floquet import AZIMUTH_COUNTS, common_period
 
     period, _ = common_period(craft)
-    steps = math.ceil(period * abs(model.poles[-1]) / LARGEST_STEP)
-    return min(max(LEAST_INSTANTS, 2 * steps), AZIMUTH_COUNTS[1])  # two instants make a step
+    steps = math.ceil(period * abs(model.poles[-1]) / MAX_STEP)
+    return min(max(MIN_INSTANTS, 2 * steps), AZIMUTH_COUNTS[1])  # two instants make a step
 
 
 def _print_floquet(model: "LinearModel", found: "Floquet") -> None:

@@ -34,7 +34,7 @@ TYPED = {
     "sideslip_deg": "sideslip",
     "turn_rate_deg": "turn_rate",
 }
-MOST_POINTS = 100_000
+MAX_POINTS = 100_000
 
 
 def main() -> int:
@@ -140,8 +140,8 @@ def _values(arguments: argparse.Namespace) -> list[float]:
     if len(arguments.range) != 3:
         raise UsageError("needed are START STOP COUNT, or --values")
     start, stop, count = arguments.range
-    if not (1 <= count <= MOST_POINTS and count == int(count)):
-        raise UsageError(f"COUNT = {count:g}: allowed are whole numbers from 1 to {MOST_POINTS}")
+    if not (1 <= count <= MAX_POINTS and count == int(count)):
+        raise UsageError(f"COUNT = {count:g}: allowed are whole numbers from 1 to {MAX_POINTS}")
     steps = max(int(count) - 1, 1)
     return [start + (stop - start) * i / steps for i in range(int(count))]
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from sbs_sim.aircraft import Aircraft
 
-MOST_WORKERS = 256
+MAX_WORKERS = 256
 POLL_PERIOD = 0.05  # s between looks whether the caller wants to go on
 
 
@@ -57,7 +57,7 @@ def compute(
     workers : int
         Number of threads.
     cancelled : callable, optional
-        Asked several times a second; after a True no further call is begun.
+        Asked several times a second; after a True no further call is started.
     dask : str or distributed.Client, optional
         Address of the scheduler of a cluster, which then takes the calls in place of threads. Calls of a worker that
         is lost are made again.
@@ -115,7 +115,7 @@ def checked_workers(workers: int | None, dask: object, error: type[SbsError]) ->
         return len(os.sched_getaffinity(0))
     if dask is not None:
         raise error(f"workers = {checks.shown(workers)}: not allowed with dask, whose workers are those of the cluster")
-    return checks.whole("workers", workers, 1, MOST_WORKERS, error)
+    return checks.whole("workers", workers, 1, MAX_WORKERS, error)
 
 
 def _pool(workers: int, dask: "str | distributed.Client | None") -> AbstractContextManager[Pool]:

@@ -26,13 +26,13 @@ class Direct:
     aircraft : Aircraft
     command : callable
         Controls of tick i at a time.
-    stand : ndarray, shape (n_rotors, 3), or None
-        Where the swashplates stand before; None where nobody knows.
+    initial : ndarray, shape (n_rotors, 3), or None
+        Swashplate angles before the flight [rad]; None if unknown.
     """
 
-    def __init__(self, aircraft: Aircraft, command: Command, stand: Array | None) -> None:
+    def __init__(self, aircraft: Aircraft, command: Command, initial: Array | None) -> None:
         self.command, self._aircraft = command, aircraft
-        self._before, self._largest = stand, np.zeros((len(aircraft.rotors), len(S.SWASHPLATE_NAMES)))
+        self._before, self._largest = initial, np.zeros((len(aircraft.rotors), len(S.SWASHPLATE_NAMES)))
         self._given, self._angles = b"", np.empty(0)
 
     def angles(self, controls: Array, time: float) -> Array:
@@ -46,7 +46,7 @@ class Direct:
         self._given, self._angles, self._before = controls.tobytes(), angles, angles
         return angles
 
-    def told(self, tick: float) -> Iterator[str]:
+    def warnings(self, tick: float) -> Iterator[str]:
         """What the actuators would not have done, with ticks of this length [s]."""
         for rotor, row in zip(self._aircraft.rotors, self._largest, strict=True):
             for name, step in zip(S.SWASHPLATE_NAMES, row, strict=True):
@@ -58,11 +58,11 @@ class Direct:
 class Mixed:
     """Swashplates that the mixer moves; see `Direct`."""
 
-    def __init__(self, aircraft: Aircraft, command: Command, stand: Array | None) -> None:
+    def __init__(self, aircraft: Aircraft, command: Command, initial: Array | None) -> None:
         self.command, self._mixer = command, Mixer(aircraft)
         self._clipped: dict[str, None] = {}
-        if stand is not None:
-            self._mixer.stand(stand)
+        if initial is not None:
+            self._mixer.set_position(initial)
 
     def angles(self, controls: Array, time: float) -> Array:
         """Swashplate angles [rad] at a time [s], shape (n_rotors, 3), on the way to what controls [rad] want."""
@@ -70,7 +70,7 @@ class Mixed:
         self._clipped |= dict.fromkeys(self._mixer.saturated)
         return self._mixer.move(time)
 
-    def told(self, _: float) -> Iterator[str]:
+    def warnings(self, _: float) -> Iterator[str]:
         """What was clipped."""
         return (f"clipped: {text}" for text in self._clipped)
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-RETIRED = -2  # in place of a state that is to blame for an end
+RETIRED = -2  # in place of the index of the state that ended the flight
 
 
 class Flown(NamedTuple):
@@ -41,7 +41,7 @@ class Flown(NamedTuple):
     watched : ndarray of int64, shape (n,)
         Ticks, from the first that was flown here, at which that was.
     ticks : int
-        Whole ones that were flown.
+        Complete ticks that were flown.
     fault : SimulationError or None
         Why the flight ended before its last tick; it cannot go on then.
     """
@@ -55,21 +55,21 @@ class Flown(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Plan(ByContent):
-    """Ticks of a flight that are told of, and the air of all.
+    """Ticks of a flight that are recorded, and the air of all.
 
     Attributes
     ----------
-    told, watched : ndarray of int64
+    recorded, watched : ndarray of int64
         Ticks from now on: whose instants become rows, and whose working states are looked at.
     steps, looks : ndarray of int64
         Steps at which those begin.
     air : ndarray, shape (ticks + 1, WIND_SIZE)
-    azimuth, wind : ndarray, shapes (len(told), n_rotors) [rad], (len(told), 3) [m/s]
+    azimuth, wind : ndarray, shapes (len(recorded), n_rotors) [rad], (len(recorded), 3) [m/s]
     watched_azimuth, watched_wind : ndarray
         The same of the ticks that are watched.
     """
 
-    told: NDArray[np.int64]
+    recorded: NDArray[np.int64]
     watched: NDArray[np.int64]
     steps: NDArray[np.int64]
     looks: NDArray[np.int64]
@@ -93,7 +93,7 @@ class Formation:
     def __init__(self, simulations: Sequence[Simulation]) -> None:
         self.simulations, first = tuple(simulations), simulations[0]
         self._engine = first.engine if len(simulations) == 1 else _engine(simulations)
-        self._culprit = np.full(self._engine.n, FLYING, dtype=np.int64)
+        self._failed = np.full(self._engine.n, FLYING, dtype=np.int64)
         self._bounds = self._engine.lanes([one.bounds for one in simulations])
         self._start = self._engine.lanes([one.azimuth0 for one in simulations])
 
@@ -115,7 +115,7 @@ class Formation:
         list of Flown
             Of each flight. Flights that ended in a call before have no rows.
         """
-        engine, count, flew = self._engine, len(swashplates[0]), (self._culprit == FLYING).tolist()
+        engine, count, flew = self._engine, len(swashplates[0]), (self._failed == FLYING).tolist()
         code = engine.code
         # one that still flies: those that have ended stay where and when that was
         lead = flew.index(True) if any(flew[: len(self.simulations)]) else 0
@@ -125,16 +125,16 @@ class Formation:
             _plan(one, count, ticks, every, loaded) if flew[lane] and lane != lead else plan
             for lane, one in enumerate(self.simulations)
         ]
-        told, watched = plan.told, plan.watched
+        recorded, watched = plan.recorded, plan.watched
         x, step = engine.lanes([one.state for one in self.simulations]), np.full(engine.n, first.step)
-        states, forces = engine.memory(len(told), engine.size), engine.memory(len(told), 3)
-        loads = engine.memory(len(told), LOAD_SIZE * engine.rotors)
+        states, forces = engine.memory(len(recorded), engine.size), engine.memory(len(recorded), 3)
+        loads = engine.memory(len(recorded), LOAD_SIZE * engine.rotors)
         working = engine.memory(len(watched), engine.rotors, WORKING_SIZE)
         fly(
             *(code.advance, code.derivative, code.working_state, engine.model, x, self._start, step),
             *(first.steps_per_tick, first.step_size, first.method, self._bounds, engine.work, engine.tick),
-            *(self._culprit, engine.lanes([angles.reshape(count, -1) for angles in swashplates])),
-            *(engine.lanes([plan.air for plan in plans]), ticks, _first(told, count), every, loaded),
+            *(self._failed, engine.lanes([angles.reshape(count, -1) for angles in swashplates])),
+            *(engine.lanes([plan.air for plan in plans]), ticks, _first(recorded, count), every, loaded),
             *(engine.lanes([plan.azimuth for plan in plans]), engine.lanes([plan.wind for plan in plans])),
             *(states, forces, loads, _first(watched, count), first.watch),
             *(
@@ -145,10 +145,10 @@ class Formation:
         )
         found = []
         for lane, (one, plan, angles) in enumerate(zip(self.simulations, plans, swashplates, strict=True)):
-            end, whole = (int(step[lane]), int(step[lane]) // one.steps_per_tick) if flew[lane] else (-1, -1)
-            whole -= one.step // one.steps_per_tick
+            end, ticks_flown = (int(step[lane]), int(step[lane]) // one.steps_per_tick) if flew[lane] else (-1, -1)
+            ticks_flown -= one.step // one.steps_per_tick
             if flew[lane]:
-                one.go_on(end, x[:, lane].copy(), plan.air[ticks], angles[-1].copy())
+                one.take_over(end, x[:, lane].copy(), plan.air[ticks], angles[-1].copy())
             rows = _rows(one, plan, angles, states[..., lane], forces[..., lane], loads[..., lane])
             rows = replace(rows, acceleration=rows.acceleration + _gravity(one, rows.state)) if loaded else rows
             found.append(
@@ -156,7 +156,7 @@ class Formation:
                     rows.first(int(np.count_nonzero(plan.steps <= end))),
                     working[plan.looks <= end, ..., lane],
                     plan.watched[plan.looks <= end],
-                    whole,
+                    ticks_flown,
                     self._fault(lane),
                 )
             )
@@ -164,15 +164,15 @@ class Formation:
 
     def retire(self, lane: int) -> None:
         """Fly one of the flights no further."""
-        self._culprit[lane] = RETIRED
+        self._failed[lane] = RETIRED
 
     def _fault(self, lane: int) -> SimulationError | None:
         """Why a flight has ended."""
-        culprit = int(self._culprit[lane])
-        if culprit in (FLYING, RETIRED):
+        failed = int(self._failed[lane])
+        if failed in (FLYING, RETIRED):
             return None
-        value = self._engine.tick.last[min(culprit, self._engine.size - 1), lane]
-        return self.simulations[lane].end(culprit, float(value))
+        value = self._engine.tick.last[min(failed, self._engine.size - 1), lane]
+        return self.simulations[lane].failure(failed, float(value))
 
 
 def _engine(simulations: Sequence[Simulation]) -> Engine:
@@ -187,14 +187,14 @@ def _first(ticks: NDArray[np.int64], otherwise: int) -> int:
 
 
 def _plan(one: Simulation, count: int, ticks: int, every: int, loaded: bool) -> _Plan:
-    """What is told of so many ticks of a flight."""
+    """What is recorded of so many ticks of a flight."""
     air = one.air_ahead(ticks)
     begin = one.step // one.steps_per_tick
-    told, watched = (np.arange(-(-begin // n) * n - begin, count, n) for n in (every, one.watch))
-    steps, looks = (begin + told) * one.steps_per_tick, (begin + watched) * one.steps_per_tick
-    wind = one.air_at(steps, air[told]) if loaded else np.zeros((len(told), 3))
+    recorded, watched = (np.arange(-(-begin // n) * n - begin, count, n) for n in (every, one.watch))
+    steps, looks = (begin + recorded) * one.steps_per_tick, (begin + watched) * one.steps_per_tick
+    wind = one.air_at(steps, air[recorded]) if loaded else np.zeros((len(recorded), 3))
     seen = one.azimuths(looks), one.air_at(looks, air[watched])
-    return _Plan(told, watched, steps, looks, air, one.azimuths(steps), wind, *seen)
+    return _Plan(recorded, watched, steps, looks, air, one.azimuths(steps), wind, *seen)
 
 
 def _rows(one: Simulation, plan: _Plan, angles: Array, states: Array, forces: Array, loads: Array) -> Rows:
@@ -204,7 +204,7 @@ def _rows(one: Simulation, plan: _Plan, angles: Array, states: Array, forces: Ar
         time=np.multiply(plan.steps, one.step_size, dtype=float),
         state=np.ascontiguousarray(states),
         acceleration=np.ascontiguousarray(forces),
-        swashplate=angles[plan.told],
+        swashplate=angles[plan.recorded],
         azimuth=plan.azimuth,
         loads=np.ascontiguousarray(loads).reshape(len(plan.steps), -1, LOAD_SIZE),
         wind=plan.wind,

@@ -37,8 +37,8 @@ class History(dict[str, Array]):
 
     def __repr__(self) -> str:
         time = self["time"]
-        told = f", {len(self.warnings)} warnings" if self.warnings else ""
-        return f"<flight of {time[-1] - time[0]:g} s, {len(time)} rows of {', '.join(self)}{told}>"
+        note = f", {len(self.warnings)} warnings" if self.warnings else ""
+        return f"<flight of {time[-1] - time[0]:g} s, {len(time)} rows of {', '.join(self)}{note}>"
 
 
 def history(
@@ -47,8 +47,8 @@ def history(
     """History, see `simulate`, of as many snapshots as pilot controls [rad], each shape (4,), with further warnings."""
     rows = Rows(**{field.name: np.array([getattr(one, field.name) for one in snapshots]) for field in fields(Rows)})
     working = np.array([one.working for one in snapshots if one.working is not None])
-    told = (*flight_warnings(aircraft, working), *warnings)
-    return History(named_histories(aircraft, [(rows, np.array(given))], True), told)
+    lines = (*flight_warnings(aircraft, working), *warnings)
+    return History(named_histories(aircraft, [(rows, np.array(given))], True), lines)
 
 
 def named_histories(aircraft: Aircraft, blocks: Sequence[tuple[Rows, Array]], loaded: bool) -> dict[str, Array]:

@@ -70,8 +70,8 @@ class Mixer:
             texts += _clipped([f"{rotor.name} {name}" for name in SWASHPLATE_NAMES], row, limited)
         self.saturated = tuple(texts)
 
-    def stand(self, angles: ArrayLike) -> None:
-        """Take it that the swashplates stand at these angles [rad], shape (n_rotors, 3), and rest there."""
+    def set_position(self, angles: ArrayLike) -> None:
+        """Set the angles at which the swashplates rest now [rad], shape (n_rotors, 3)."""
         self._angles = np.array(angles, dtype=float)
         self._rests = True
 
@@ -89,8 +89,8 @@ class Mixer:
     def move(self, time: float) -> Array:
         """Swashplate angles [rad], shape (n_rotors, 3), at a time [s].
 
-        They move towards the target at their actuators' rates. Where the swashplates stand before the first target is
-        not known unless `stand` has told it; else they are at the first target at once.
+        They move towards the target at their actuators' rates. The first target is reached at once
+        unless `set_position` has set where the swashplates are.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What is told of a flight: instants, rows of instants, and what acted on it."""
+"""Records of a flight: instants, rows of instants, and the events that acted on it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Snapshot(ByContent):
-    """Everything that can be told of one instant.
+    """State and loads of a flight at one instant.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Event(ByContent):
         Of a start: integration steps before its wind was set, which is earlier than the start where a log begins in
         mid-flight.
     wind_ticks : int
-        Of a start: ticks of its wind that have begun; 0 for one that is new.
+        Of a start: ticks of its wind that have started; 0 for one that is new.
     """
 
     step: int

@@ -32,7 +32,7 @@ def started(aircraft: Aircraft, events: Sequence[Event], **options: Any) -> Simu
     if start is None or start.kind != "start" or start.state is None or start.swashplate is None:
         raise SimulationError("events: the first must be the start of the flight")
     simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **options)
-    simulation.go_on_from(start)
+    simulation.resume_from(start)
     return simulation
 
 

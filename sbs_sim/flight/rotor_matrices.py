@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LIFT_SLOPE = 2.0 * math.pi  # 1/rad, of a thin airfoil
-LARGEST_LOADING = 0.1  # C_T / sigma at which most rotors stall
+MAX_LOADING = 0.1  # C_T / sigma at which most rotors stall
 ANGLE_STEP, INFLOW_STEP = 1e-4, 1e-5  # rad, of differences; those of rates are the angle's in a radian of rotation
 
 
@@ -120,7 +120,7 @@ def carrying(aircraft: "Aircraft", rotor: "Rotor") -> tuple[float, float]:
     solidity = rotor.blades * 0.5 * (rotor.chord_root + rotor.chord_tip) / (math.pi * rotor.radius)
     pressure = environment.air_density * math.pi * (rotor.radius * tip_speed) ** 2
     share = aircraft.body.mass * environment.gravity / len(aircraft.rotors)
-    thrust = min(share / pressure, LARGEST_LOADING * solidity) if pressure > 0.0 else 0.0
+    thrust = min(share / pressure, MAX_LOADING * solidity) if pressure > 0.0 else 0.0
     inflow = math.sqrt(0.5 * thrust)
     twist = rotor.twist_root + 0.75 * (rotor.twist_tip - rotor.twist_root)
     collective = 6.0 * thrust / (solidity * LIFT_SLOPE) + 1.5 * inflow - twist

@@ -46,8 +46,8 @@ def simulate(
         See `Simulation`. A trim point is flown with the velocity of the steady wind added.
     actuators : bool
         False: controls must be within their ranges, and the swashplates follow them at once, as linear models have it;
-        steps that their actuators would not follow are told in `warnings`. True: the mixer of the live flight is
-        between them. It clips controls and angles to their ranges, which is told, and moves the swashplates at the
+        steps that their actuators would not follow are in `warnings`. True: the mixer of the live flight is
+        between them. It clips controls and angles to their ranges, with a warning, and moves the swashplates at the
         rates of their actuators.
 
     Returns

@@ -1,6 +1,6 @@
 """Flight in time: a stateful `Simulation` that advances tick by tick.
 
-A tick is the period at which states are handed out and commands taken in; it holds a whole number of integration
+A tick is the period at which states are handed out and commands taken in; it holds an integer number of integration
 steps. Steps are counted in integers from the start, and time is step x dt, so that the same commands at the same steps
 give the same flight to the last bit.
 """
@@ -41,8 +41,8 @@ AZIMUTH_STEP_DEG = 14.4  # by default: docs/speed.md has its errors
 AZIMUTH_STEP = math.radians(AZIMUTH_STEP_DEG)
 
 # A tick is one uninterrupted call of compiled code; this many steps take it a tenth of a second.
-MOST_STEPS_PER_TICK = 10_000
-MOST_WIND_TICKS = 1_000_000_000  # that turbulence is brought forward by for a log that begins in mid-flight: minutes
+MAX_STEPS_PER_TICK = 10_000
+MAX_WIND_TICKS = 1_000_000_000  # that turbulence is brought forward by for a log that begins in mid-flight: minutes
 WATCH_PERIOD = 0.1  # s of flight between looks whether the model holds
 
 # Beyond these magnitudes a state is not plausible and the simulation stops. The angles and the inflow are far outside
@@ -67,7 +67,7 @@ class Simulation:
     tick : float
         Length of a tick [s], 1e-4 to 1.
     azimuth_step : float
-        Largest step of the fastest rotor's azimuth [rad]; the step is the tick divided by the smallest whole number
+        Largest step of the fastest rotor's azimuth [rad]; the step is the tick divided by the smallest integer
         that keeps to it.
     lead_lag, cyclic_inflow : bool
         Fidelity.
@@ -120,10 +120,10 @@ class Simulation:
         fastest = max(rotor.speed for rotor in aircraft.rotors)
         # the margin keeps a step that is right but for rounding from being cut once more
         self.steps_per_tick = max(1, math.ceil(fastest * tick / azimuth_step * (1 - 1e-12)))
-        if self.steps_per_tick > MOST_STEPS_PER_TICK:
+        if self.steps_per_tick > MAX_STEPS_PER_TICK:
             raise SimulationError(
                 f"azimuth_step = {math.degrees(azimuth_step):g} deg takes {self.steps_per_tick} steps in a tick of"
-                f" {tick:g} s: allowed are up to {MOST_STEPS_PER_TICK}"
+                f" {tick:g} s: allowed are up to {MAX_STEPS_PER_TICK}"
             )
         self.step_size = tick / self.steps_per_tick
         self.method = METHODS[method]
@@ -165,7 +165,7 @@ class Simulation:
         swashplate, state = self.swashplate.copy(), self.state.copy()
         return Event(self.step, "start", swashplate, state, self.wind, self._wind_step, self._field.ticks)
 
-    def go_on_from(self, start: Event) -> None:
+    def resume_from(self, start: Event) -> None:
         """Take step, and with it time and azimuths, and the age of the wind from the start of a log.
 
         Raises
@@ -174,7 +174,7 @@ class Simulation:
             The start is before its wind, or long after it.
         """
         checks.whole("wind_step", start.wind_step, 0, start.step, SimulationError)
-        checks.whole("wind_ticks", start.wind_ticks, 0, MOST_WIND_TICKS, SimulationError)
+        checks.whole("wind_ticks", start.wind_ticks, 0, MAX_WIND_TICKS, SimulationError)
         self.step, self._wind_step = start.step, start.wind_step
         self._field = WindField(self.wind, start.wind_step * self.step_size, self.tick)
         self._air = self._field.tick_number(max(1, start.wind_ticks))
@@ -273,7 +273,7 @@ class Simulation:
             The next step would leave the finite or the plausible: the message names step, time and state. The state
             is that of the last good step.
         """
-        engine, culprit = self.engine, np.full(1, FLYING)
+        engine, failed = self.engine, np.full(1, FLYING)
         advance(
             *(
                 engine.code.derivative,
@@ -283,16 +283,16 @@ class Simulation:
                 _single(self.azimuth0),
             ),
             *(self.step, self.steps_per_tick, self.step_size, _single(self._air), self.method, _single(self.bounds)),
-            *(engine.work, engine.tick, engine.tick.done, culprit),
+            *(engine.work, engine.tick, engine.tick.done, failed),
         )
         self.step += int(engine.tick.done[0])
-        if culprit[0] != FLYING:
-            raise self.end(int(culprit[0]), float(engine.tick.last[min(culprit[0], engine.size - 1), 0]))
+        if failed[0] != FLYING:
+            raise self.failure(int(failed[0]), float(engine.tick.last[min(failed[0], engine.size - 1), 0]))
         self._air = self._field.next_tick()
 
-    def end(self, culprit: int, value: float) -> SimulationError:
+    def failure(self, failed: int, value: float) -> SimulationError:
         """Why the flight cannot go on: a state that the next step would take to a value beyond the plausible."""
-        if culprit == self.layout.size:
+        if failed == self.layout.size:
             speed = math.sqrt(sum(float(part) ** 2 for part in self.state[S.VELOCITY : S.RATES]))
             return SimulationError(
                 f"ground contact after step {self.step} (t = {self.time:.4f} s) at {speed:.3g} m/s:"
@@ -300,8 +300,8 @@ class Simulation:
             )
         return SimulationError(
             f"step {self.step + 1} (t = {(self.step + 1) * self.step_size:.4f} s) would take"
-            f" {self.layout.names[culprit]} to {value:g}: plausible are magnitudes"
-            f" up to {self.bounds[culprit]:g}"
+            f" {self.layout.names[failed]} to {value:g}: plausible are magnitudes"
+            f" up to {self.bounds[failed]:g}"
         )
 
     def fly(self, swashplates: Array, ticks: int, every: int = 1, loaded: bool = True) -> Flown:
@@ -311,7 +311,7 @@ class Simulation:
         """
         return Formation([self]).fly([swashplates], ticks, every, loaded)[0]
 
-    def go_on(self, step: int, state: Array, air: Array, swashplate: Array) -> None:
+    def take_over(self, step: int, state: Array, air: Array, swashplate: Array) -> None:
         """Take over what a flight in a formation has come to, with the air of its next tick."""
         self.step, self.state, self._air, self.swashplate = step, state, air, swashplate
 
@@ -377,7 +377,7 @@ def plausible_bounds(aircraft: Aircraft) -> Array:
 
 
 def held_states(aircraft: Aircraft, lead_lag: bool, cyclic_inflow: bool) -> NDArray[np.int64]:
-    """Places of the states that stay zero without lag or without cyclic inflow."""
+    """Indices of the states that stay zero without lag or without cyclic inflow."""
     layout = aircraft.layout
     index = np.arange(layout.size)
     held: list[int] = []

@@ -77,9 +77,9 @@ class Sortie:
         air = Wind() if wind is None else wind
         checks.instance("wind", air, Wind, SimulationError)
         state = trimmed_state(aircraft, start, wind=air.velocity) if isinstance(start, TrimPoint) else start
-        stand = start.swashplate if isinstance(start, TrimPoint) else None
+        initial = start.swashplate if isinstance(start, TrimPoint) else None
         pilot_command = command(controls)
-        self._pilot = (Mixed if actuators else Direct)(aircraft, pilot_command, stand)
+        self._pilot = (Mixed if actuators else Direct)(aircraft, pilot_command, initial)
         angles = self._pilot.angles(pilot_command(0, 0.0), 0.0)
         self.simulation = Simulation(aircraft, state, angles, wind=air, **options)
         self.ticks = round(duration / self.simulation.tick)
@@ -122,8 +122,8 @@ class Sortie:
             raise self.fault
         aircraft = self.simulation.aircraft
         working = np.concatenate(self._looks)
-        told = (*flight_warnings(aircraft, working), *self._pilot.told(self.simulation.tick))
-        return History(named_histories(aircraft, self._blocks, self.loaded), told), self.fault
+        lines = (*flight_warnings(aircraft, working), *self._pilot.warnings(self.simulation.tick))
+        return History(named_histories(aircraft, self._blocks, self.loaded), lines), self.fault
 
 
 def fly_together(sorties: Sequence[Sortie]) -> None:

@@ -14,16 +14,14 @@ from sbs_sim.model import working_state as W
 Array = NDArray[np.float64]
 
 # Beyond this the inflow over the disc is no longer linear along and across it, and the retreating blade is stalled.
-LARGEST_ADVANCE_RATIO = 0.4
-LARGEST_STALLED = 0.1  # of the disc; the sections know nothing of dynamic stall
-LARGEST_REVERSED = (
-    0.1  # of the disc; reached at an advance ratio of 0.63, where the circle of reverse flow has mu^2 / 4
-)
+MAX_ADVANCE_RATIO = 0.4
+MAX_STALLED = 0.1  # of the disc; the sections know nothing of dynamic stall
+MAX_REVERSED = 0.1  # of the disc; reached at an advance ratio of 0.63, where the circle of reverse flow has mu^2 / 4
 # Airfoil tables have no Mach number. By the rule of Prandtl and Glauert (J. D. Anderson: Fundamentals of aerodynamics,
 # section 11.4) a section lifts 1 / sqrt(1 - M^2) of what it does in incompressible flow: 11 % more at this one.
-LARGEST_TIP_MACH = 0.44
+MAX_TIP_MACH = 0.44
 INCOMPRESSIBLE = "where incompressible section data do not hold"
-LARGEST_OUTSIDE = 0.1  # of the disc, with Reynolds numbers that the airfoil's table does not have
+MAX_OUTSIDE = 0.1  # of the disc, with Reynolds numbers that the airfoil's table does not have
 # Momentum theory in descent, in hover inflow velocities: the vortex ring state begins and ends where the motion of a
 # helicopter in it becomes unstable, W. Johnson: Model for vortex ring state influence on rotorcraft flight dynamics,
 # NASA/TP-2005-213477; up to twice the hover inflow there is no stream tube, J. G. Leishman: Principles of helicopter
@@ -32,7 +30,7 @@ RING_DESCENT = (0.45, 1.5)
 RING_EDGEWISE = 0.95
 WINDMILL_DESCENT = 2.0
 MARGIN = 1e-9  # for rounding
-LEAST_INFLOW = 0.002  # hover inflow ratio below which a rotor carries nothing, and has none of these states
+MIN_INFLOW = 0.002  # hover inflow ratio below which a rotor carries nothing, and has none of these states
 
 NORMAL, UNLOADED, VORTEX_RING, TURBULENT_WAKE, WINDMILL = INFLOW_STATES = (
     "normal",
@@ -78,7 +76,7 @@ def working_state(row: Array | Sequence[float]) -> WorkingState:
         Of `sbs_sim.model.working_state`.
     """
     hover = float(row[W.HOVER_INFLOW])
-    loaded = hover >= LEAST_INFLOW
+    loaded = hover >= MIN_INFLOW
     descent = float(row[W.DESCENT]) / hover if loaded else 0.0
     edgewise = float(row[W.ADVANCE_RATIO]) / hover if loaded else 0.0
     state = inflow_state(descent, edgewise, float(row[W.FLOW]) >= 0.0) if loaded else UNLOADED
@@ -146,20 +144,18 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
         state = working_state(row)
         if state.inflow_state in (VORTEX_RING, TURBULENT_WAKE):
             found.append(f"{rotor.name}: {state.inflow_state} state, where momentum theory does not hold")
-        if state.advance_ratio > LARGEST_ADVANCE_RATIO:
-            found.append(f"{rotor.name}: advance ratio above {LARGEST_ADVANCE_RATIO:g}")
-        if state.stalled_share > LARGEST_STALLED:
-            found.append(f"{rotor.name}: stall on more than {LARGEST_STALLED:.0%} of the disc, without its dynamics")
-        if state.reversed_share > LARGEST_REVERSED:
-            found.append(f"{rotor.name}: reverse flow on more than {LARGEST_REVERSED:.0%} of the disc")
-        if tip_mach(aircraft, rotor, row) > LARGEST_TIP_MACH:
-            found.append(f"{rotor.name}: tip Mach number above {LARGEST_TIP_MACH:g}, {INCOMPRESSIBLE}")
-        if state.outside_share > LARGEST_OUTSIDE:
+        if state.advance_ratio > MAX_ADVANCE_RATIO:
+            found.append(f"{rotor.name}: advance ratio above {MAX_ADVANCE_RATIO:g}")
+        if state.stalled_share > MAX_STALLED:
+            found.append(f"{rotor.name}: stall on more than {MAX_STALLED:.0%} of the disc, without its dynamics")
+        if state.reversed_share > MAX_REVERSED:
+            found.append(f"{rotor.name}: reverse flow on more than {MAX_REVERSED:.0%} of the disc")
+        if tip_mach(aircraft, rotor, row) > MAX_TIP_MACH:
+            found.append(f"{rotor.name}: tip Mach number above {MAX_TIP_MACH:g}, {INCOMPRESSIBLE}")
+        if state.outside_share > MAX_OUTSIDE:
             low, *_, high = aircraft.airfoils[rotor.airfoil].reynolds
             table = f"{low:g} to {high:g}, those of the airfoil table,"
-            found.append(
-                f"{rotor.name}: Reynolds number outside {table} on more than {LARGEST_OUTSIDE:.0%} of the disc"
-            )
+            found.append(f"{rotor.name}: Reynolds number outside {table} on more than {MAX_OUTSIDE:.0%} of the disc")
     return found
 
 
@@ -171,8 +167,8 @@ def flight_warnings(aircraft: Aircraft, working: Array) -> Iterator[str]:
     aircraft : Aircraft
     working : ndarray, shape (n, n_rotors, WORKING_SIZE)
     """
-    told = working[~_is_quiet(aircraft, working)] if len(working) else working
-    return iter(dict.fromkeys(line for rows in told for line in warnings(aircraft, rows)))
+    exceeding = working[~_is_quiet(aircraft, working)] if len(working) else working
+    return iter(dict.fromkeys(line for rows in exceeding for line in warnings(aircraft, rows)))
 
 
 def _is_quiet(aircraft: Aircraft, working: Array) -> NDArray[np.bool_]:
@@ -180,11 +176,11 @@ def _is_quiet(aircraft: Aircraft, working: Array) -> NDArray[np.bool_]:
     sound = aircraft.environment.speed_of_sound
     tips = np.array([rotor.speed * rotor.radius for rotor in aircraft.rotors])
     quiet = (
-        (working[..., W.ADVANCE_RATIO] <= LARGEST_ADVANCE_RATIO)
-        & (working[..., W.STALLED] <= LARGEST_STALLED)
-        & (working[..., W.REVERSED] <= LARGEST_REVERSED)
-        & (working[..., W.OUTSIDE] <= LARGEST_OUTSIDE)
-        & (tips * (1.0 + working[..., W.ADVANCE_RATIO]) / sound <= LARGEST_TIP_MACH)
+        (working[..., W.ADVANCE_RATIO] <= MAX_ADVANCE_RATIO)
+        & (working[..., W.STALLED] <= MAX_STALLED)
+        & (working[..., W.REVERSED] <= MAX_REVERSED)
+        & (working[..., W.OUTSIDE] <= MAX_OUTSIDE)
+        & (tips * (1.0 + working[..., W.ADVANCE_RATIO]) / sound <= MAX_TIP_MACH)
         # no vortex ring before its slowest descent, and nothing beyond it
         & (working[..., W.DESCENT] < RING_DESCENT[0] * (1.0 - MARGIN) * working[..., W.HOVER_INFLOW])
     )

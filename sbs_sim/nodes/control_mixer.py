@@ -92,7 +92,7 @@ class ControlMixer(Component):
             angles = np.array(message.swashplate).reshape(-1, len(SWASHPLATE_NAMES))
             self._mixer.forget()
             if len(angles) == len(self._mixer.aircraft.rotors):  # else it is another aircraft's
-                self._mixer.stand(angles)
+                self._mixer.set_position(angles)
 
     def _on_controls(self, message: Controls) -> None:
         self._follow_resets()
@@ -100,7 +100,7 @@ class ControlMixer(Component):
             self._commands.check(message)
             self._mixer.set_target(controls_array(message))
             if self._loop is not None and self._mixer.rests:
-                self._mixer.stand(self._loop.swashplate())
+                self._mixer.set_position(self._loop.swashplate())
         except SbsError as error:
             self._commands.add(error)
             return

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sbs_sim.analysis.sweep import Sweep, SweepPoint
     from sbs_sim.flight.trim_point import TrimPoint
 
-MOST_ROWS = 100  # of a sweep: half of them from its beginning, half from its end
+MAX_ROWS = 100  # of a sweep: half of them from its beginning, half from its end
 NUMBERS = "text-align:right;font-variant-numeric:tabular-nums"
 
 
@@ -24,7 +24,7 @@ def trim_html(point: "TrimPoint") -> str:
     rows = [[f"{name} [deg]", _fixed(math.degrees(value), 4)] for name, value in angles]
     for name, unit, values in (("thrust", "N", point.thrust), ("power", "W", point.power)):
         rows.append([f"{name} [{unit}]", " + ".join(_fixed(value, 2) for value in values)])
-    return _paragraph(f"Trim: {_condition(point)}") + _table(["", ""], rows) + _told(point)
+    return _paragraph(f"Trim: {_condition(point)}") + _table(["", ""], rows) + _warnings(point)
 
 
 def model_html(model: "LinearModel") -> str:
@@ -43,7 +43,7 @@ def model_html(model: "LinearModel") -> str:
     size = f"{len(model.state_names)} states, {len(model.control_names)} controls, {len(model.output_names)} outputs"
     heading = _paragraph(f"Linear model, {model.method}, {size}: {_condition(model.trim)}")
     columns = ["mode", "pole [rad/s]", "frequency [rad/s]", "damping", "half [s]", "double [s]"]
-    return heading + _table(columns, rows) + _told(model.trim)
+    return heading + _table(columns, rows) + _warnings(model.trim)
 
 
 def sweep_html(found: "Sweep") -> str:
@@ -52,8 +52,8 @@ def sweep_html(found: "Sweep") -> str:
     columns = [f"{found.parameter} [{unit}]" if unit else found.parameter, "pitch [deg]", "roll [deg]"]
     columns += [f"{name} [deg]" for name in CONTROL_NAMES] + ["power [W]", "growing modes", ""]
     rows = [_sweep_row(value, point) for value, point in zip(shown, found.points, strict=True)]
-    if len(rows) > MOST_ROWS:
-        half = MOST_ROWS // 2
+    if len(rows) > MAX_ROWS:
+        half = MAX_ROWS // 2
         rows = [*rows[:half], [f"… {len(rows) - 2 * half} more …", *[""] * (len(columns) - 1)], *rows[-half:]]
     failed = f", {len(found.failed)} of them without a result" if found.failed else ""
     return _paragraph(f"Sweep of {found.parameter}: {len(found.points)} points{failed}") + _table(columns, rows, (8, 9))
@@ -64,9 +64,9 @@ def _sweep_row(value: float, point: "SweepPoint") -> list[str]:
         return [f"{value:.6g}", *["–"] * 7, "", point.error or ""]
     angles = np.degrees([point.trim.pitch, point.trim.roll, *point.trim.controls])
     growing = [mode.name for mode in point.model.modes if mode.pole.real > 0.0] if point.model else []
-    told = [*([point.error] if point.error else []), *point.trim.beyond_limits, *point.warnings]
+    remarks = [*([point.error] if point.error else []), *point.trim.beyond_limits, *point.warnings]
     cells = [*(_fixed(angle, 3) for angle in angles), _fixed(point.trim.power.sum(), 1)]
-    return [f"{value:.6g}", *cells, "; ".join(growing), "; ".join(told)]
+    return [f"{value:.6g}", *cells, "; ".join(growing), "; ".join(remarks)]
 
 
 def _condition(point: "TrimPoint") -> str:
@@ -79,7 +79,7 @@ def _condition(point: "TrimPoint") -> str:
     return f"airspeed {given.airspeed:g} m/s, climb {given.climb_rate:g} m/s, {angles}{without}"
 
 
-def _told(point: "TrimPoint") -> str:
+def _warnings(point: "TrimPoint") -> str:
     lines = [f"beyond its limits: {line}" for line in point.beyond_limits]
     return "".join(map(_paragraph, [*lines, *(f"outside the model's validity: {line}" for line in point.warnings)]))
 

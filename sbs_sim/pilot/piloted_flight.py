@@ -75,7 +75,7 @@ def simulate_with_pilot(
     waiting: collections.deque[Array] = collections.deque()
     if isinstance(start, TrimPoint):
         state = trimmed_state(aircraft, start)
-        mixer.stand(start.swashplate)
+        mixer.set_position(start.swashplate)
         waiting.extend([start.controls] * delay)
     else:
         state = checks.array("start", start, PilotError)

@@ -26,8 +26,8 @@ def progress_bar(unit: str, total: float | None = None) -> Iterator[Callable[...
 
     with tqdm(total=total, unit=unit, file=sys.stderr, leave=False) as bar:
 
-        def progress(*told: Any) -> None:
-            done, known = told[-2:]
+        def progress(*arguments: Any) -> None:
+            done, known = arguments[-2:]
             bar.update(done - bar.n)  # less than nothing where work begins again
             if known != bar.total:
                 bar.total = known

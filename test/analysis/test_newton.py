@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sbs_sim.analysis.newton import LARGEST_UNKNOWN, newton
+from sbs_sim.analysis.newton import MAX_UNKNOWN, newton
 
 
 class Counted:
@@ -67,7 +67,7 @@ def test_what_has_no_root_is_not_found():
 def test_roots_beyond_the_allowed_are_not_reached():
     solution = newton(lambda values: values - 2.0, one(0.0))
     assert not solution.converged
-    assert 1.5 < solution.values[0] < LARGEST_UNKNOWN
+    assert 1.5 < solution.values[0] < MAX_UNKNOWN
 
 
 def test_values_that_are_not_numbers_are_stepped_over():

@@ -11,7 +11,7 @@ import sbs_sim
 from sbs_sim import linearize, simulate_batch, sweep, trim
 from sbs_sim.analysis.batch import Case
 from sbs_sim.model import state as S
-from sbs_sim.output.notebook import MOST_ROWS
+from sbs_sim.output.notebook import MAX_ROWS
 
 VICIOUS = "<script>alert(\"1\")</script> & 'x'"
 
@@ -75,10 +75,10 @@ def test_a_sweep_is_shown_with_what_failed(sbs):
     assert float(rows[1][2]) == pytest.approx(np.degrees(found.points[1].trim.roll), abs=1e-3)
     assert rows[0][8].startswith("phugoid") or "phugoid" in rows[0][8]
     assert rows[2][9].startswith("sideslip = 3.159")
-    many = dataclasses.replace(found, points=found.points[:1] * (MOST_ROWS + 3))
+    many = dataclasses.replace(found, points=found.points[:1] * (MAX_ROWS + 3))
     rows = Page(many._repr_html_()).rows
-    assert len(rows) == MOST_ROWS + 2
-    assert rows[1 + MOST_ROWS // 2][0] == "… 3 more …"
+    assert len(rows) == MAX_ROWS + 2
+    assert rows[1 + MAX_ROWS // 2][0] == "… 3 more …"
 
 
 def test_no_text_of_theirs_is_markup(model, sbs):

@@ -278,7 +278,7 @@ def test_flight_away_from_hover_fails_and_says_how(name, condition):
     assert int(parts["outer"]) >= 1
     assert int(parts["inner"]) >= 1
     assert float(parts["change"]) > 0.1 or parts["reason"] == "the loops come to rest off trim"
-    assert error.value.residual > 10 * two_loop.LARGEST_RESIDUAL
+    assert error.value.residual > 10 * two_loop.MAX_RESIDUAL
 
 
 def test_newton_finds_what_the_loops_do_not(sbs):
@@ -304,9 +304,9 @@ def test_outer_loop_drives_away_from_a_hover_that_is_not_symmetric(sbs, hover):
 @pytest.mark.parametrize(
     ("limit", "value", "condition", "reason"),
     [
-        ("MOST_OUTER", 2, {}, "the outer loop does not end"),
-        ("MOST_INNER", 3, {"climb_rate": 2.0, "guess": [0.15, 0.0, 0.0, 0.0]}, "the inner loop does not end"),
-        ("LARGEST_RESIDUAL", 1e-4, {"airspeed": 10.0, "cyclic_inflow": False}, "the loops come to rest off trim"),
+        ("MAX_OUTER_ITERATIONS", 2, {}, "the outer loop does not end"),
+        ("MAX_INNER_ITERATIONS", 3, {"climb_rate": 2.0, "guess": [0.15, 0.0, 0.0, 0.0]}, "the inner loop does not end"),
+        ("MAX_RESIDUAL", 1e-4, {"airspeed": 10.0, "cyclic_inflow": False}, "the loops come to rest off trim"),
     ],
 )
 def test_every_end_is_told(sbs, monkeypatch, limit, value, condition, reason):

@@ -56,15 +56,15 @@ def test_where_descent_ends(hover_inflow):
 
 def test_where_the_sections_end(sbs, tip_speed):
     sound = sbs.environment.speed_of_sound
-    assert said(r"advance ratio 0\.4: (\d+) m/s") == pytest.approx(validity.LARGEST_ADVANCE_RATIO * tip_speed, abs=0.5)
+    assert said(r"advance ratio 0\.4: (\d+) m/s") == pytest.approx(validity.MAX_ADVANCE_RATIO * tip_speed, abs=0.5)
     assert said(r"in hover it is ([\d.]+), and") == pytest.approx(tip_speed / sound, abs=5e-4)
     assert said(r"in hover it is [\d.]+, and ([\d.]+) %") == pytest.approx(
         100 * (1 / math.sqrt(1 - (tip_speed / sound) ** 2) - 1), abs=0.05
     )
     assert said(r"where that is (\d+) %") == pytest.approx(
-        100 * (1 / math.sqrt(1 - validity.LARGEST_TIP_MACH**2) - 1), abs=0.5
+        100 * (1 / math.sqrt(1 - validity.MAX_TIP_MACH**2) - 1), abs=0.5
     )
-    reversed_at = 2 * math.sqrt(validity.LARGEST_REVERSED)
+    reversed_at = 2 * math.sqrt(validity.MAX_REVERSED)
     assert said(r"an advance ratio of ([\d.]+): 80") == pytest.approx(reversed_at, abs=0.005)
     assert said(r"an advance ratio of 0\.63: (\d+) m/s") == pytest.approx(reversed_at * tip_speed, abs=0.5)
 

@@ -35,18 +35,19 @@ are therefore best worked out in Python.
 What is not a number
 --------------------
 NaN and infinities go through arithmetic as IEEE 754 says, in their own lane only. A comparison with NaN is false.
-`least(a, b)` and `greatest(a, b)` give the first argument where one of the two is NaN: what must survive stands first.
+`minimum(a, b)` and `maximum(a, b)` give the first argument where one of the two is NaN: put first the one whose NaN
+must be kept.
 
 Compiled and interpreted
 ------------------------
 Functions that numba compiles use LLVM's vectors (`sbs_sim.lanes.compiled`). With NUMBA_DISABLE_JIT the same source runs
-on the classes of `sbs_sim.lanes.interpreted`, to the same bits: what a reader can step through.
+on the classes of `sbs_sim.lanes.interpreted`, to the same bits, for a debugger.
 
 On a processor without fused multiplication every fused operation is a call of a library: the same bits, several times
 slower.
 """
 
-from sbs_sim.lanes import compiled as _compiled  # noqa: F401  (teaches numba what stands below)
+from sbs_sim.lanes import compiled as _compiled  # noqa: F401  (registers the types and functions below with numba)
 from sbs_sim.lanes.interpreted import (
     ZERO,
     Lanes,
@@ -59,9 +60,9 @@ from sbs_sim.lanes.interpreted import (
     cross,
     dot,
     floor,
-    greatest,
     inverse_root_guess,
-    least,
+    maximum,
+    minimum,
     rounded,
     select,
     sqrt,
@@ -88,9 +89,9 @@ __all__ = [
     "cross",
     "dot",
     "floor",
-    "greatest",
     "inverse_root_guess",
-    "least",
+    "maximum",
+    "minimum",
     "rounded",
     "select",
     "spread",

@@ -441,12 +441,12 @@ for _function, _name in ((abs, "fabs"), (plain.sqrt, "sqrt"), (plain.floor, "flo
 
 def _inverse_root_guess(builder: Any, a: Any) -> Any:
     n = a.type.count if isinstance(a.type, ir.VectorType) else 1
-    whole = vector_of(INT64, n)
+    integers = vector_of(INT64, n)
 
     def constant(value: int) -> Any:
-        return ir.Constant(whole, [value] * n if n > 1 else value)
+        return ir.Constant(integers, [value] * n if n > 1 else value)
 
-    half = builder.lshr(builder.bitcast(a, whole), constant(1))
+    half = builder.lshr(builder.bitcast(a, integers), constant(1))
     return builder.bitcast(builder.sub(constant(plain.INVERSE_ROOT), half), vector_of(DOUBLE, n))
 
 
@@ -457,13 +457,13 @@ register(
     (plain.with_sign,), TWO, _lanes_result, _of_lanes(lambda builder, a, b: intrinsic_call(builder, "copysign", a, b))
 )
 register(
-    (plain.least,),
+    (plain.minimum,),
     TWO,
     _lanes_result,
     _of_lanes(lambda builder, a, b: builder.select(builder.fcmp_ordered("<", b, a), b, a)),
 )
 register(
-    (plain.greatest,),
+    (plain.maximum,),
     TWO,
     _lanes_result,
     _of_lanes(lambda builder, a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a)),

@@ -1,6 +1,6 @@
 """What lanes are, in plain Python: the meaning of every operation, and what runs where nothing is compiled.
 
-The rules of rounding stand in the package's docstring.
+See the package's docstring for the rules of rounding.
 """
 
 import math
@@ -276,16 +276,16 @@ def sqrt(x: Any) -> Lanes:
 
 
 def floor(x: Any) -> Lanes:
-    """Largest whole number that is not greater."""
+    """Largest integer that is not greater."""
     return Lanes(np.floor(rounded(x).values))
 
 
-def least(a: Any, b: Any) -> Lanes:
+def minimum(a: Any, b: Any) -> Lanes:
     """Return b where it is less, else a: a where one of the two is NaN."""
     return select(rounded(b) < a, b, a)
 
 
-def greatest(a: Any, b: Any) -> Lanes:
+def maximum(a: Any, b: Any) -> Lanes:
     """Return b where it is greater, else a: a where one of the two is NaN."""
     return select(rounded(b) > a, b, a)
 

@@ -1,16 +1,16 @@
 """Lanes in memory: arrays and records of numpy's whose last axis are the lanes.
 
 An array of shape (..., n) is an array of shape (...) of lanes. A structured array whose fields have shapes (n,), (3,
-n), (3, 3, n) or (m, n) is an array of records of lanes, vectors, matrices, or m lanes; fields of whole numbers stay
-what they are. Nothing is copied: what is written goes into the numpy array.
+n), (3, 3, n) or (m, n) is an array of records of lanes, vectors, matrices, or m lanes; fields of integers stay
+integers. Nothing is copied: writing changes the numpy array.
 
-Blades by fours
+Quads of blades
 ---------------
-Where the lanes are blades, every four of them are a quad: blades of one rotor, in order, the last quad of a rotor
-filled up with blades that weigh nothing. A register of eight lanes holds two quads, perhaps of two rotors. `spread` and
-`add_to_quads` go between what belongs to a quad (or its rotor) and its blades. Where the lanes are flights, a register
-holds the same blade of each, and both do nothing but read and add: the same source serves both, to the same bits, for a
-sum goes from blade to blade of a quad, and then from quad to quad, in either case.
+Where the lanes are blades, four of them make a quad: blades of one rotor, in order; the last quad of a rotor is padded
+with weightless blades. A register of eight lanes holds two quads, which may belong to two rotors. `spread` copies
+a value of a quad (or of its rotor) to its blades, `add_to_quads` sums over the blades of a quad. Where the lanes are
+flights, a register holds the same blade of each flight; then the two only read and add. The bits are the same in both
+cases, since sums always go from blade to blade of a quad, and then from quad to quad.
 """
 
 import operator
@@ -121,7 +121,7 @@ def _matrix(values: Any) -> Matrix:
 
 
 def _field_kind(dtype: np.dtype[Any]) -> str | None:
-    """What a field of a structured array holds; None for a whole number."""
+    """Kind of value in a field of a structured array; None for an integer."""
     if dtype.base.kind == "i":
         return None
     if len(dtype.shape) == 1:
@@ -189,7 +189,7 @@ register_model(FieldArrayType)(_PointerModel)
 
 
 def _field_type(kind: Any) -> tuple[Any, int]:
-    """Type of a field of a structured array for compiled code, and its number of lanes (0 for a whole number)."""
+    """Type of a field of a structured array for compiled code, and its number of lanes (0 for an integer)."""
     if not isinstance(kind, types.NestedArray):
         return kind, 0
     *parts, n = kind.shape
@@ -313,7 +313,7 @@ def _lanes_of(like: Any) -> int:
     return int(like.dtype.n if isinstance(like, types.Array) else like.n)
 
 
-# --- blades by fours --------------------------------------------------------------------------------------------
+# --- quads of blades --------------------------------------------------------------------------------------------
 
 
 def _pointer(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
@@ -326,17 +326,17 @@ def _pointer(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> A
 
 
 @intrinsic
-def _spread(typingctx: Any, values: Any, places: Any, quad: Any, like: Any) -> Any:
+def _spread(typingctx: Any, values: Any, indices: Any, quad: Any, like: Any) -> Any:
     narrow, wide = _lanes_of(values), _lanes_of(like)
     quads = 1 if narrow == wide else wide // QUAD
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        data = arrayobj.make_array(places)(context, builder, args[1]).data
+        data = arrayobj.make_array(indices)(context, builder, args[1]).data
         first = context.cast(builder, args[2], sig.args[2], types.int64)
         found = []
         for i in range(quads):
-            place = builder.load(builder.gep(data, [builder.add(first, INT64(i))]))
-            found.append(builder.load(_pointer(context, builder, values, args[0], place), align=8))
+            index = builder.load(builder.gep(data, [builder.add(first, INT64(i))]))
+            found.append(builder.load(_pointer(context, builder, values, args[0], index), align=8))
         if narrow == wide:
             return found[0]
         parts = [broadcast(builder, part, QUAD) for part in found]
@@ -344,7 +344,7 @@ def _spread(typingctx: Any, values: Any, places: Any, quad: Any, like: Any) -> A
             return parts[0]
         return shuffle(builder, parts[0], parts[1], [0] * QUAD + [QUAD] * QUAD)
 
-    return LanesType(wide)(values, places, quad, like), codegen
+    return LanesType(wide)(values, indices, quad, like), codegen
 
 
 def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
@@ -419,9 +419,9 @@ def _store(builder: Any, base: Any, vectors: list[Any], count: int, add: bool) -
             for lane in range(count - done):
                 _store(builder, _ahead(builder, base, done + lane), [element(builder, vector, lane)], 1, add)
             return
-        place = builder.bitcast(_ahead(builder, base, done), vector.type.as_pointer())
-        before = builder.load(place, align=8) if add else ir.Constant(vector.type, None)
-        builder.store(builder.fadd(before, vector), place, align=8)
+        pointer = builder.bitcast(_ahead(builder, base, done), vector.type.as_pointer())
+        before = builder.load(pointer, align=8) if add else ir.Constant(vector.type, None)
+        builder.store(builder.fadd(before, vector), pointer, align=8)
         done += size
 
 
@@ -429,7 +429,7 @@ def _ahead(builder: Any, base: Any, count: int) -> Any:
     return builder.gep(base, [INT64(8 * count)])
 
 
-# --- whole records ----------------------------------------------------------------------------------------------
+# --- entire records ----------------------------------------------------------------------------------------------
 
 
 def _numbers(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> list[Any]:
@@ -457,8 +457,8 @@ def _copy_record(typingctx: Any, to: Any, index: Any, records: Any, number: Any)
 
 def _two_records(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     """Numbers of the records to and from."""
-    places = (context.cast(builder, args[i], sig.args[i], types.int64) for i in (1, 3))
-    arrays = zip((sig.args[0], sig.args[2]), (args[0], args[2]), places, strict=True)
+    indices = (context.cast(builder, args[i], sig.args[i], types.int64) for i in (1, 3))
+    arrays = zip((sig.args[0], sig.args[2]), (args[0], args[2]), indices, strict=True)
     return [_numbers(context, builder, *array) for array in arrays]
 
 
@@ -484,10 +484,10 @@ def _table_row(typingctx: Any, table: Any, row: Any, x: Any, degree: Any) -> Any
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         rows, ahead = (as_type(context, builder, Typed(sig.args[i], args[i]), LanesType(n)) for i in (1, 2))
-        whole = builder.fptosi(rows, ir.VectorType(INT64, n) if n > 1 else INT64)
+        integers = builder.fptosi(rows, ir.VectorType(INT64, n) if n > 1 else INT64)
         data = arrayobj.make_array(table)(context, builder, args[0]).data
         width = INT64(QUAD * (powers + 1))
-        starts = [builder.gep(data, [builder.mul(element(builder, whole, lane), width)]) for lane in range(n)]
+        starts = [builder.gep(data, [builder.mul(element(builder, integers, lane), width)]) for lane in range(n)]
         # two rows in a register where there are enough
         groups = [(lane, lane + QUAD) for lane in range(QUAD)] if n > QUAD else [(lane,) for lane in range(n)]
         found = []
@@ -513,13 +513,13 @@ def _fours(builder: Any, starts: Sequence[Any], lanes: Sequence[int], power: int
     """The four coefficients of a power of the rows of some lanes, side by side."""
     parts = []
     for lane in lanes:
-        place = builder.gep(starts[lane], [INT64(QUAD * power)])
-        parts.append(builder.load(builder.bitcast(place, ir.VectorType(DOUBLE, QUAD).as_pointer()), align=8))
+        pointer = builder.gep(starts[lane], [INT64(QUAD * power)])
+        parts.append(builder.load(builder.bitcast(pointer, ir.VectorType(DOUBLE, QUAD).as_pointer()), align=8))
     return parts[0] if len(parts) == 1 else shuffle(builder, parts[0], parts[1], list(range(2 * QUAD)))
 
 
 def _columns(builder: Any, rows: list[Any], n: int) -> list[Any]:
-    """Four columns of n rows of four, as vectors of n; of eight, rows k and k + 4 stand in one register."""
+    """Four columns of n rows of four, as vectors of n; of eight, rows k and k + 4 share a register."""
     if n == 1:
         return [builder.extract_element(rows[0], INT32(i)) for i in range(QUAD)]
     if n == 2:
@@ -554,11 +554,11 @@ def _width(like: Any) -> int:
     return max(int(dtype[name].shape[-1]) for name in dtype.names if dtype[name].shape)
 
 
-def _plain_spread(values: Any, places: Any, quad: int, like: Any) -> Lanes:
+def _plain_spread(values: Any, indices: Any, quad: int, like: Any) -> Lanes:
     narrow, wide = _width(values), _width(like)
     if narrow == wide:
-        return Lanes(values[places[quad]].values)
-    return Lanes(np.concatenate([np.repeat(values[places[quad + i]].values, QUAD) for i in range(wide // QUAD)]))
+        return Lanes(values[indices[quad]].values)
+    return Lanes(np.concatenate([np.repeat(values[indices[quad + i]].values, QUAD) for i in range(wide // QUAD)]))
 
 
 def _plain_add_to_quads(sums: Any, quad: int, begins: int, first: str, values: Any) -> None:
@@ -588,8 +588,8 @@ def _plain_add_record(to: Any, index: int, records: Any, number: int) -> None:
 
 def _plain_table_row(table: Any, row: Any, x: Any, degree: int) -> tuple[Lanes, ...]:
     columns = []
-    for place, own in zip(*np.broadcast_arrays(rounded(row).values, rounded(x).values), strict=True):
-        powers = table[int(place)].reshape(degree + 1, QUAD)
+    for index, own in zip(*np.broadcast_arrays(rounded(row).values, rounded(x).values), strict=True):
+        powers = table[int(index)].reshape(degree + 1, QUAD)
         value = list(powers[-1])
         for lower in powers[-2::-1]:
             value = [fused(high, float(own), float(low)) for high, low in zip(value, lower, strict=True)]

@@ -59,11 +59,12 @@ class AirfoilTable(ByContent):
 
 
 def stall_angles(table: AirfoilTable) -> tuple[Array, Array]:
-    """Angles of attack of the largest lift of attached flow, upwards and downwards: beyond them a section is stalled.
+    """Angles of attack of maximum and minimum lift of attached flow: beyond them a section is stalled.
 
     The flow is attached from the angle of no lift on as long as there is more than half of the lift that the slope
     there gives; so neither dents and plateaus of the curve are stall, nor is the second rise of lift that a plate has
-    towards 45 deg its largest lift. What was made by `extend_polar` is stalled. A section without lift never stalls.
+    towards 45 deg its maximum lift. Angles that `extend_polar` has added are stalled. A section without
+    lift never stalls.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def stall_angles(table: AirfoilTable) -> tuple[Array, Array]:
     Returns
     -------
     highest, lowest : ndarray, shape (n_re,)
-        Of each Reynolds number of the table [rad]. Of equal largest lifts it is the one nearest to zero.
+        For each Reynolds number of the table [rad]. Of several angles of equal lift the one nearest to zero.
 
     References
     ----------
@@ -81,13 +82,13 @@ def stall_angles(table: AirfoilTable) -> tuple[Array, Array]:
     model for dynamic stall, Journal of the American Helicopter Society 34 (3), 1989.
     """
     lowest, highest = table.given
-    above = [_largest_lift(table.alpha, cl) for cl in table.cl]
-    below = [_largest_lift(table.alpha, -cl[::-1]) for cl in table.cl]
+    above = [_max_lift_angle(table.alpha, cl) for cl in table.cl]
+    below = [_max_lift_angle(table.alpha, -cl[::-1]) for cl in table.cl]
     return np.minimum(above, highest), -np.minimum(below, -lowest)
 
 
-def _largest_lift(alpha: Array, cl: Array) -> float:
-    """Angle of the largest lift of attached flow, upwards from 0 [rad]; pi where there is no lift."""
+def _max_lift_angle(alpha: Array, cl: Array) -> float:
+    """Angle of maximum lift of attached flow, upwards from 0 [rad]; pi where there is no lift."""
     attached = max(ATTACHED, 1.5 * (alpha[1] - alpha[0]))
     near = np.abs(alpha) < attached
     slope, at_zero = np.polyfit(alpha[near], cl[near], 1)
@@ -306,8 +307,8 @@ def _check_angles(path: Path, values: Array, lines: list[int], blocks: list[slic
     _check_span(path, angles, lines)
     step = (angles[-1] - angles[0]) / (len(angles) - 1)
     half = round(float(180 / step))
-    place = angles / 180 * half
-    for i in np.flatnonzero(np.abs(place - np.rint(place)) > STEP_TOLERANCE):
+    steps = angles / 180 * half
+    for i in np.flatnonzero(np.abs(steps - np.rint(steps)) > STEP_TOLERANCE):
         allowed = f"a multiple of a step that divides 180, not of {step:.10g}"
         raise _bad(path, lines[i], "alpha_deg", angles[i], allowed)
     return half
@@ -416,13 +417,13 @@ def _polynomials(values: Array, interpolation: str) -> Array:
 def _monotone_slopes(rise: Array) -> Array:
     """Slopes at the beginning of every interval, per interval; the intervals go round the circle.
 
-    The mean of the rises on both sides, not more than three times the lesser: section 4 of Fritsch and Carlson. Zero at
-    a highest or lowest point.
+    The mean of the rises on both sides, not more than three times the smaller: section 4 of Fritsch and Carlson. Zero
+    at a maximum or minimum.
     """
     before = np.roll(rise, 1, axis=1)
-    least = 3.0 * np.minimum(np.abs(before), np.abs(rise))
+    limit = 3.0 * np.minimum(np.abs(before), np.abs(rise))
     mean = 0.5 * (before + rise)
-    limited = np.where(np.abs(mean) > least, np.copysign(least, mean), mean)
+    limited = np.where(np.abs(mean) > limit, np.copysign(limit, mean), mean)
     return np.where(before * rise > 0.0, limited, 0.0)
 
 
@@ -465,9 +466,9 @@ def interpolate(
     knots, step = table.reynolds, table.alpha[1] - table.alpha[0]
     clamped = np.clip(reynolds, knots[0], knots[-1])
     i = np.clip(np.searchsorted(knots, clamped, side="right") - 1, 0, len(knots) - 2)
-    place = np.mod(np.asarray(alpha, dtype=np.float64) + np.pi, 2 * np.pi) / step
-    j = np.clip(place.astype(np.int64), 0, len(table.alpha) - 2)
+    position = np.mod(np.asarray(alpha, dtype=np.float64) + np.pi, 2 * np.pi) / step
+    j = np.clip(position.astype(np.int64), 0, len(table.alpha) - 2)
     rows = cells(table, interpolation).reshape(len(knots) - 1, -1, DEGREE + 1, 4)[i, j]
-    powers = (place - j)[..., None] ** np.arange(DEGREE + 1)
+    powers = (position - j)[..., None] ** np.arange(DEGREE + 1)
     lift, lift_slope, drag, drag_slope = np.moveaxis(np.einsum("...k,...kc->...c", powers, rows), -1, 0)
     return lift + lift_slope * clamped, drag + drag_slope * clamped

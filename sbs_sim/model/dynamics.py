@@ -141,15 +141,15 @@ def in_lanes(model):
     """A model as records of lanes."""
     blades = as_records(model.blades)
     return Aircraft(
-        as_records(model.switches),
-        as_records(model.air),
-        as_records(model.body),
-        as_records(model.rotors),
-        blades,
-        model.indices,
-        as_records(model.elements),
-        as_lanes(model.knots, blades),
-        model.table,
+        switches=as_records(model.switches),
+        air=as_records(model.air),
+        body=as_records(model.body),
+        rotors=as_records(model.rotors),
+        blades=blades,
+        indices=model.indices,
+        elements=as_records(model.elements),
+        knots=as_lanes(model.knots, blades),
+        table=model.table,
     )
 
 
@@ -158,18 +158,18 @@ def memory_in_lanes(work):
     """Memory as records of lanes."""
     sums = as_records(work.sums)
     return Memory(
-        as_lanes(work.state, sums),
-        as_records(work.terms),
-        sums,
-        as_records(work.means),
-        as_records(work.hubs),
-        as_records(work.totals),
-        as_records(work.harmonics),
-        as_records(work.acceleration),
-        as_records(work.flow),
-        as_records(work.strip),
-        as_records(work.loads),
-        work.span,
+        state=as_lanes(work.state, sums),
+        terms=as_records(work.terms),
+        sums=sums,
+        means=as_records(work.means),
+        hubs=as_records(work.hubs),
+        totals=as_records(work.totals),
+        harmonics=as_records(work.harmonics),
+        acceleration=as_records(work.acceleration),
+        flow=as_records(work.flow),
+        strip=as_records(work.strip),
+        loads=as_records(work.loads),
+        span=work.span,
     )
 
 
@@ -177,7 +177,7 @@ def memory_in_lanes(work):
 def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
     """Set the derivative of `memory.state`."""
     flight = body_motion(aircraft, memory.state, wind)
-    blade_terms(aircraft, memory, flight, swash, psi)
+    set_blade_terms(aircraft, memory, flight, swash, psi)
     sum_blades(aircraft, memory)
     set_hub_velocities(aircraft, memory, flight)
     loads = body_loads(aircraft, memory, flight)
@@ -185,13 +185,13 @@ def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
         solve_with_blades(aircraft, memory, loads)
         solve_blades(aircraft, memory)
         if with_loads:
-            hub_loads(aircraft, memory)
+            set_hub_loads(aircraft, memory)
     else:
         solve_blades_alone(aircraft, memory)
-        hub_loads(aircraft, memory)
+        set_hub_loads(aircraft, memory)
         solve_body_alone(aircraft, memory, loads)
-    body_rates(memory, flight, dx)
-    rotor_rates(aircraft, memory, dx)
+    set_body_rates(memory, flight, dx)
+    set_rotor_rates(aircraft, memory, dx)
 
 
 @kernel
@@ -222,7 +222,7 @@ def hub_motion(part, flight):
 
 
 @kernel
-def blade_terms(aircraft, memory, flight, swash, psi):
+def set_blade_terms(aircraft, memory, flight, swash, psi):
     """Set the terms of every blade and their sums over quads."""
     air = aircraft.air[0]
     for r in range(memory.span[0], memory.span[1]):
@@ -236,13 +236,13 @@ def blade_terms(aircraft, memory, flight, swash, psi):
         pitch = blade_pitch(aircraft, blade, pose, swash)
         elements = aircraft.elements[blade.elements]
         loads = section_loads(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, pitch)
-        # the hub's known acceleration, as the hinges and as the loads on the hub have it (theory.md sections 3.1, 5.1)
+        # known acceleration of the hub in a_0, for the hinges (theory.md section 3.1) and for the hub loads (5.1)
         if aircraft.switches[0].complete_coupling == 1:
             at_hinges, at_hub = to_blade(blade, basis, hub.centripetal), to_blade(blade, basis, hub.centripetal)
         else:
             gravity = transposed(blade.axes) @ flight.gravity
             at_hinges, at_hub = -to_blade(blade, basis, gravity), Vector(0.0, 0.0, 0.0)
-        set_terms(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub)
+        set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub)
         terms.u_t_hinge, terms.u_t_slope = flow.u_t_hinge, flow.u_t_slope
         terms.u_p_hinge, terms.u_p_slope = flow.u_p_hinge, flow.u_p_slope
         terms.pitch = pitch
@@ -252,9 +252,10 @@ def blade_terms(aircraft, memory, flight, swash, psi):
 def induced_velocity(aircraft, x, blade, pose):
     """Induced velocity at the hub [m/s], and its slope along the radius at the azimuth of blades [1/s], eq. (4.2)."""
     inflow, quad = aircraft.indices.inflow, blade.quad
-    lambdas = spread(x, inflow[S.SINE], quad, blade) * pose.sine
-    gradient = blade.rotor_speed * (spread(x, inflow[S.COSINE], quad, blade) * pose.cosine + lambdas)
-    return blade.rotor_speed * blade.radius * spread(x, inflow[S.UNIFORM], quad, blade), gradient
+    lambda0, lambdas, lambdac = inflow[S.UNIFORM], inflow[S.SINE], inflow[S.COSINE]
+    sine_part = spread(x, lambdas, quad, blade) * pose.sine
+    gradient = blade.rotor_speed * (spread(x, lambdac, quad, blade) * pose.cosine + sine_part)
+    return blade.rotor_speed * blade.radius * spread(x, lambda0, quad, blade), gradient
 
 
 @kernel
@@ -288,10 +289,11 @@ def blade_pitch(aircraft, blade, pose, swash):
 
 
 @kernel
-def set_terms(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub):
-    """Set the terms of register r of blades, and add to the sums what the equations of the body need of them.
+def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub):
+    """Set what a register r of blades has in the equations (5.6), and add it to the sums.
 
-    `at_hinges` and `at_hub` are known accelerations of the hub [m/s^2], see `blade_terms`.
+    `at_hinges` and `at_hub` are the known accelerations of the hub [m/s^2] in the moments about the hinges and in the
+    loads on the hub.
     """
     blade, terms = aircraft.blades[r], memory.terms[r]
     own = blade_accelerations(basis, motion)
@@ -308,11 +310,22 @@ def set_terms(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub
     terms.known_force, terms.known_moment = known.force, known.moment
     if aircraft.switches[0].complete_hub_moment == 0:
         terms.paper_moment, terms.flap_axis = paper_moment(blade, basis, pose, loads)
+    add_to_sums(memory, blade, pose, basis, loads, moments, flap, lag, known, inverse_lag_inertia)
+
+
+@kernel
+def add_to_sums(memory, blade, pose, basis, loads, moments, flap, lag, known, inverse_lag_inertia):
+    """Add to the sums over quads what the equations of the body and of the inflow need, in the order of SUMS.
+
+    `flap` and `lag` are c_beta and c_xi about the c.g. The hinges are eliminated, eq. (5.8).
+    """
     thrust = basis.cos_flap * loads.normal_force
     root_moment = blade.hinge_offset * loads.normal_force + loads.normal_moment  # Int (e_0 + s) dF_n
     first_moment, second_moment = locked_inertia(blade, basis)
-    flap_acceleration = rounded(blade.inverse_second_moment * moments.flap)  # of a body that does not accelerate
+    flap_acceleration = rounded(blade.inverse_second_moment * moments.flap)  # while the body does not accelerate
     lag_acceleration = rounded(inverse_lag_inertia * moments.lag)
+    force = known.force - flap.force * flap_acceleration - lag.force * lag_acceleration
+    moment = known.moment - flap.moment * flap_acceleration - lag.moment * lag_acceleration
     add_to_quads(
         memory.sums,
         blade.quad,
@@ -320,10 +333,7 @@ def set_terms(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub
         "thrust",
         (thrust, root_moment * pose.sine, root_moment * pose.cosine, blade.mass, first_moment)
         + second_moment
-        + (
-            known.force - flap.force * flap_acceleration - lag.force * lag_acceleration,
-            known.moment - flap.moment * flap_acceleration - lag.moment * lag_acceleration,
-        )
+        + (force, moment)
         + hinge_inertia(flap, lag, blade.inverse_second_moment, inverse_lag_inertia),
     )
 
@@ -426,7 +436,7 @@ def solve_with_blades(aircraft, memory, loads):
     right = ForceMoment(loads.force + total.force, loads.moment + total.moment)
     m, s, i = body.mass + total.mass, body.first_moment + total.first_moment, body.inertia
     e = symmetric(total.second_moment)
-    # less what the hinges give way, c c^T / A
+    # the sum of c c^T / A over the hinges, block by block
     h_force, h_coupling, h_moment = symmetric(total.hinge_mass), total.hinge_coupling, symmetric(total.hinge_inertia)
     force_block = Symmetric(m - h_force.xx, m - h_force.yy, m - h_force.zz, -h_force.xy, -h_force.yz, -h_force.zx)
     coupling_block = Matrix(
@@ -527,7 +537,7 @@ def solve_blades_alone(aircraft, memory):
 
 
 @kernel
-def hub_loads(aircraft, memory):
+def set_hub_loads(aircraft, memory):
     """Set thrust, shaft torque, force and moment of each rotor on its hub (theory.md section 5.5)."""
     sum_hub_loads(aircraft, memory)
     switches = aircraft.switches[0]
@@ -599,7 +609,7 @@ def with_hub_loads(aircraft, memory, loads):
 
 
 @kernel
-def body_rates(memory, flight, dx):
+def set_body_rates(memory, flight, dx):
     """Set the rates of position, attitude, velocity and angular velocity (theory.md section 5.6)."""
     acceleration = memory.acceleration[0]
     S.set_vector(dx, S.POSITION, flight.to_earth @ flight.velocity)
@@ -610,7 +620,7 @@ def body_rates(memory, flight, dx):
 
 
 @kernel
-def rotor_rates(aircraft, memory, dx):
+def set_rotor_rates(aircraft, memory, dx):
     """Set the rates of the multiblade coordinates (paper eqs. [13], [14]) and of the inflow."""
     x, lead_lag = memory.state, aircraft.switches[0].lead_lag
     for r in range(aircraft.blades.shape[0]):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sbs_sim.lanes import Matrix, Vector, as_lanes, as_records, cross, dot, greatest, least, sqrt
+from sbs_sim.lanes import Matrix, Vector, as_lanes, as_records, cross, dot, maximum, minimum, sqrt
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.trigonometry import TINY, angle_of, cosine_sine, inverse_root
 
@@ -54,7 +54,7 @@ def _angles_of(quaternions, like, out):
     given, angles = as_lanes(quaternions, records), as_lanes(out, records)
     for i in range(given.shape[0]):
         w, x, y, z = given[i, 0], given[i, 1], given[i, 2], given[i, 3]
-        sine = least(greatest(2.0 * (w * y - z * x), -1.0), 1.0)
+        sine = minimum(maximum(2.0 * (w * y - z * x), -1.0), 1.0)
         angles[i, 0] = direction(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         angles[i, 1] = angle_of(sine, sqrt(1.0 - sine * sine), 1.0)
         angles[i, 2] = direction(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))

@@ -1,9 +1,9 @@
 """The ground: a level plane, and where the aircraft would touch it (theory.md section 7.5).
 
-The model knows nothing of a fuselage's shape: what can touch are the centre of gravity and the rims of the rotor discs.
+The fuselage has no shape: the centre of gravity and the rims of the rotor discs can touch the ground.
 """
 
-from sbs_sim.lanes import as_lanes, as_records, dot, greatest, sqrt
+from sbs_sim.lanes import as_lanes, as_records, dot, maximum, sqrt
 from sbs_sim.model.frames import rotation, shaft_down
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.state import DOWN, attitude_at
@@ -33,6 +33,6 @@ def lowest_down_coordinate(rotors, x):
     for j in range(rotors.shape[0]):
         rotor = rotors[j]
         cosine = dot(down, shaft_down(rotor.axes))  # of the shaft's angle to the vertical
-        rim = rotor.radius * sqrt(greatest(1.0 - cosine * cosine, 0.0))  # below the hub
-        lowest_down = greatest(lowest_down, x[DOWN] + dot(down, rotor.hub) + rim)
+        rim = rotor.radius * sqrt(maximum(1.0 - cosine * cosine, 0.0))  # below the hub
+        lowest_down = maximum(lowest_down, x[DOWN] + dot(down, rotor.hub) + rim)
     return lowest_down

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sbs_sim.lanes import all_lanes, any_lane, as_lanes, as_records, floor, greatest, least, sqrt
+from sbs_sim.lanes import all_lanes, any_lane, as_lanes, as_records, floor, maximum, minimum, sqrt
 from sbs_sim.model.exponential import begin_exponential_step, exponential_stage
 from sbs_sim.model.frames import Quaternion
 from sbs_sim.model.ground import lowest_down_coordinate
@@ -154,7 +154,7 @@ def set_azimuths(rotors, start, time, psi):
     for j in range(rotors.shape[0]):
         angle = start[j] + rotors[j].rotor_speed * time
         # the full turns are rounded too: the remainder may exceed an end by the last bit of the angle
-        psi[j] = least(greatest(angle - TURN * floor(angle * INVERSE_TURN), 0.0), TURN)
+        psi[j] = minimum(maximum(angle - TURN * floor(angle * INVERSE_TURN), 0.0), TURN)
 
 
 @entry

@@ -18,7 +18,7 @@ from llvmlite.binding import executionengine
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import cpu_target
-from numba.experimental import function_type as _function_type  # noqa: F401  (teaches numba what an `Address` is)
+from numba.experimental import function_type as _function_type  # noqa: F401  (registers the type of an `Address` with numba)
 from numba.extending import typeof_impl
 from numba.types import WrapperAddressProtocol
 
@@ -117,7 +117,7 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
 def _prepared(dispatcher: Any) -> Any:
     """Let no Ctrl-C be lost, and no time, while the machine code of a function is compiled or loaded.
 
-    LLVM calls back into Python meanwhile, and an exception that is raised in such a callback has nobody to go to.
+    LLVM calls back into Python meanwhile, and an exception that is raised in such a callback is lost.
     """
     if not numba.config.DISABLE_JIT:
         for name in ("_compile_for_args", "compile"):
@@ -127,7 +127,7 @@ def _prepared(dispatcher: Any) -> Any:
 
 
 def _without_collection(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Function that leaves garbage lie: the compiler makes objects by the million, and next to none in circles."""
+    """Function that runs without garbage collection: the compiler makes millions of objects, hardly any in cycles."""
 
     @functools.wraps(function)
     def call(*arguments: Any, **names: Any) -> Any:
@@ -160,13 +160,13 @@ class Address(WrapperAddressProtocol):
         types = tuple(numba.typeof(argument) for argument in arguments)
         function.compile(types)  # takes it from the cache; does nothing where it is there
         code = function.overloads[types]
-        self._code = code  # must not go while somebody knows where it is
-        self._place = int(code.library.get_pointer_to_function(code.fndesc.llvm_cfunc_wrapper_name))
+        self._code = code  # must live as long as its address is in use
+        self._pointer = int(code.library.get_pointer_to_function(code.fndesc.llvm_cfunc_wrapper_name))
         self.type = numba.types.FunctionType(code.signature)
 
     def __wrapper_address__(self) -> int:
-        """Where the code is; numba asks for it."""
-        return self._place
+        """Address of the code, which numba asks for."""
+        return self._pointer
 
     def signature(self) -> Any:
         """Types of arguments and result; numba asks for them."""
@@ -194,7 +194,7 @@ def target() -> tuple[str, frozenset[str]]:
 
 @contextlib.contextmanager
 def _cache_in(folder: Path) -> Iterator[None]:
-    """Let numba place caches in a folder for the functions decorated meanwhile, and nowhere else."""
+    """Let numba put caches into a folder for the functions decorated meanwhile, and nowhere else."""
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:

@@ -1,7 +1,7 @@
-"""Where the machine code of the kernels is kept: a folder into which nobody writes but those who may anyway.
+"""Folder for the machine code of the kernels, which only the user and the owners of the sources can write to.
 
-numba unpickles what it finds there and executes it. Who could put a file into such a folder, or put another folder in
-its place, could have anything executed in the name of the user.
+numba unpickles what it finds there and executes it. Anyone who can write to such a folder, or replace it,
+can execute code with the rights of the user.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ def cache_folder() -> Path | None:
     A folder named after the content of all of them can never hold stale physics.
     """
     name = f"kernels-{source_digest()}"
-    folder, refusals = _first_trusted([(base / name, judged) for base, judged in _places()])
+    folder, refusals = _first_trusted([(base / name, judged) for base, judged in _candidates()])
     beside = BESIDE / name
     if folder not in (None, beside) and "NUMBA_CACHE_DIR" not in os.environ:
         _take_over(beside, folder)
@@ -42,7 +42,7 @@ def cache_folder() -> Path | None:
     return folder
 
 
-def _places() -> Iterator[tuple[Path, bool]]:
+def _candidates() -> Iterator[tuple[Path, bool]]:
     """Folders to try, in order, each with whether all that holds it is judged.
 
     Beside the sources it is not: whoever may change the sources needs no other way.
@@ -55,11 +55,11 @@ def _places() -> Iterator[tuple[Path, bool]]:
         yield Path(home) / "sbs_sim", True
 
 
-def _first_trusted(places: Iterable[tuple[Path, bool]]) -> tuple[Path | None, list[str]]:
+def _first_trusted(candidates: Iterable[tuple[Path, bool]]) -> tuple[Path | None, list[str]]:
     """The first folder that is trusted and can be written, and why others before it are not trusted."""
     refusals = []
-    for place, judged in places:
-        folder = Path(os.path.realpath(place))  # links may be turned to somewhere else later
+    for candidate, judged in candidates:
+        folder = Path(os.path.realpath(candidate))  # links may be turned to somewhere else later
         try:
             _make(folder)
             reason = refusal(folder, [*folder.parents] if judged else [folder.parent], () if judged else (HERE,))
@@ -85,7 +85,7 @@ def _take_over(finished: Path, folder: Path) -> None:
             if (target / index.name).exists():
                 continue
             target.mkdir(mode=0o700, exist_ok=True)
-            # the index last, and each at once: what it names is whole
+            # the index last, and each file atomically: the files that an index names are complete
             for path in (*index.parent.glob(f"{index.stem}.*.nbc"), index):
                 with tempfile.NamedTemporaryFile(dir=target, delete=False) as copy:
                     copy.write(path.read_bytes())
@@ -124,9 +124,9 @@ def refusal(folder: Path, holding: Iterable[Path], like: Iterable[Path] = ()) ->
     own = folder.stat()
     if strange := _writers(own) - trusted:
         return _words(folder, strange)
-    for place, folders, files in os.walk(folder):
+    for parent, folders, files in os.walk(folder):
         for name in (*folders, *files):
-            path = Path(place, name)
+            path = Path(parent, name)
             if strange := _writers(path.lstat(), owner_alone=not own.st_mode & CLOSED) - trusted:
                 return _words(path, strange)
     return ""

@@ -6,7 +6,7 @@ from sbs_sim.model.kernel import entry, kernel
 
 @kernel
 def mix(mixing, controls, first, swash):
-    """Swashplate angles of pilot controls, which stand from `first` on: mixing @ controls."""
+    """Swashplate angles of pilot controls, which begin at index `first`: mixing @ controls."""
     for i in range(mixing.shape[0]):
         angle = rounded(mixing[i, 0] * controls[first])
         for n in range(1, mixing.shape[1]):

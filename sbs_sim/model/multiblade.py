@@ -44,7 +44,7 @@ def blade_matrix(blades: int, azimuth: float | Array, order: int = 0) -> Array:
 
 @kernel
 def blade_angle(x, angles, rates, blade, cosine, sine):
-    """Angle [rad] and rate [rad/s] of blades from the coordinates of their rotors, eqs. (1.6) and (1.10).
+    """Angle [rad] and rate [rad/s] of blades from the multiblade coordinates of their rotors, eqs. (1.6) and (1.10).
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def add_accelerations(blade, terms, means, harmonics):
 
 @kernel
 def set_accelerations(rotor, means, harmonics, dx):
-    """Accelerations of the coordinates of a rotor without what their turning gives, eq. (1.9)."""
+    """Set the accelerations of the coordinates of a rotor without the terms of their rotation, eq. (1.9)."""
     share = rotor.inverse_blades
     flap = lag = flap_differential = lag_differential = 0.0
     for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
@@ -115,9 +115,9 @@ def set_accelerations(rotor, means, harmonics, dx):
 
 @kernel
 def add_rotation_terms(rotor, x, dx, angles, rates, factor):
-    """Add `factor` times -K1 q' - K0 q (paper eqs. [26], [27]): what the turning of the coordinates gives.
+    """Add `factor` times -K1 q' - K0 q (paper eqs. [26], [27]): the terms of the rotating coordinates.
 
-    `angles` and `rates` are the places of the first coordinate and its rate.
+    `angles` and `rates` are the indices of the first coordinate and of its rate in the state.
     """
     for n in range(1, rotor.harmonics + 1):
         i = 2 * n - 1

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 LOG_2 = 0.6931471805599453
 ROOT_HALF = 0.7071067811865476
 TERMS = 12  # of the series, whose next one is 1e-19
-SHARE = 2.0**-53  # of the numbers between 0 and 1 that one of 53 bits counts
+UNIT = 2.0**-53  # maps integers of 53 bits to numbers between 0 and 1
 
 
 def normal(source: np.random.PCG64, pairs: int) -> Array:
@@ -31,15 +31,15 @@ def normal(source: np.random.PCG64, pairs: int) -> Array:
 
 @entry
 def _box_muller(bits, like, out):
-    """Pairs of normal numbers of pairs of whole numbers of 53 bits.
+    """Pairs of normal numbers from pairs of integers of 53 bits.
 
     G. E. P. Box, M. E. Muller: A note on the generation of random normal deviates, Ann. Math. Stat. 29 (2), 1958.
     """
     found = as_lanes(out, as_records(like))
     for i in range(bits.shape[0]):
-        found[i, 0] = -2.0 * logarithm((float(bits[i, 0]) + 0.5) * SHARE)
+        found[i, 0] = -2.0 * logarithm((float(bits[i, 0]) + 0.5) * UNIT)
         radius = sqrt(found[i, 0])
-        found[i, 1] = TURN * SHARE * float(bits[i, 1])
+        found[i, 1] = TURN * UNIT * float(bits[i, 1])
         cosine, sine = cosine_sine(found[i, 1])
         found[i, 0], found[i, 1] = radius * cosine, radius * sine
 

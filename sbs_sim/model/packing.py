@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sbs_sim.model.kernel import target
 from sbs_sim.model.records import BLADE, ELEMENT, QUAD, Model, StateIndices, aligned
 
-WIDE = "avx512f"  # what a processor has that holds eight numbers in a register
+WIDE = "avx512f"  # feature of processors whose registers hold eight numbers
 
 
 def lane_count() -> int:
@@ -71,7 +71,7 @@ def _widened(dtype: np.dtype[Any], n: int) -> np.dtype[Any]:
 
 
 def by_blades(model: Model, width: int) -> Model:
-    """Model of one flight whose lanes are blades, `width` of them to a register: 4, or 8 of perhaps two rotors."""
+    """Model of one flight whose lanes are blades, 4 or 8 to a register (`width`); 8 may belong to two rotors."""
     quads = _quads(model)
     while len(quads) * QUAD % width:
         quads.append([None] * QUAD)
@@ -91,7 +91,7 @@ def by_blades(model: Model, width: int) -> Model:
 
 
 def _with_copies(register: Sequence[int | None]) -> list[int]:
-    """Numbers of blades; what fills up is a copy of a neighbour."""
+    """Numbers of blades; padding is the number of a neighbour."""
     last, found = next(number for number in register if number is not None), []
     for number in register:
         last = last if number is None else number
@@ -100,7 +100,7 @@ def _with_copies(register: Sequence[int | None]) -> list[int]:
 
 
 def _quads(model: Model) -> list[list[int | None]]:
-    """Numbers of the blades of every quad; None fills up."""
+    """Numbers of the blades of every quad, padded with None."""
     quads: list[list[int | None]] = []
     first = 0
     for rotor in model.rotors:
@@ -111,7 +111,7 @@ def _quads(model: Model) -> list[list[int | None]]:
     return quads
 
 
-# What a blade weighs nothing by, and makes no force by.
+# Fields that are zero for the blades that pad a quad: these have no mass, no stiffness and no lag.
 WEIGHTLESS = (
     *("mass", "first_moment", "hub_second_moment", "inverse_second_moment", "flap_spring", "lag_spring", "lag_damping"),
     *("lead_lag", "alternation"),
@@ -119,7 +119,7 @@ WEIGHTLESS = (
 
 
 def _fill_register(model: Model, register: Sequence[int | None], blade: Any, elements: NDArray[Any]) -> None:
-    """Blades side by side; what fills up is a weightless copy of a neighbour."""
+    """Set blades side by side; padding is a weightless copy of a neighbour."""
     for lane, (number, last) in enumerate(zip(register, _with_copies(register), strict=True)):
         own = model.blades[last]
         for name in BLADE:

@@ -87,7 +87,7 @@ ELEMENT = {
     "lift_factor": LANES,
     "twist": LANES,
 }
-# sums over the blades of a quad, in the order of `sbs_sim.model.dynamics.set_terms`
+# sums over the blades of a quad, in the order of `sbs_sim.model.dynamics.add_to_sums`
 SUMS = {
     "thrust": LANES,
     "sine_moment": LANES,  # of air loads about the hub, times the sine of the azimuth

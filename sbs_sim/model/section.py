@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from sbs_sim.lanes import floor, greatest, least, select, table_row, zeros_like
+from sbs_sim.lanes import floor, maximum, minimum, select, table_row, zeros_like
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.trigonometry import TINY, angle_of, inverse_root
 
@@ -112,7 +112,7 @@ class TableCell(NamedTuple):
 @kernel
 def table_cell(blade, knots, reynolds, alpha):
     """Cell at a Reynolds number and an angle of attack [rad]; a row of the table for any values, NaN included."""
-    reynolds = least(greatest(reynolds, blade.min_reynolds), blade.max_reynolds)
+    reynolds = minimum(maximum(reynolds, blade.min_reynolds), blade.max_reynolds)
     position = (alpha - blade.first_alpha) * blade.inverse_alpha_step
     cells = blade.alpha_cells
     position = select(position < 0.0, 0.0, position)

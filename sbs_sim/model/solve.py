@@ -12,7 +12,7 @@ from sbs_sim.model.kernel import entry, kernel
 
 Array = NDArray[np.float64]
 
-JACOBI_SWEEPS, ORTHOGONAL = 40, 1e-15  # at most; cosine of two columns that need no rotation
+MAX_SWEEPS, ORTHOGONAL = 40, 1e-15  # of Jacobi rotations; cosine of two columns that need no rotation
 
 
 def solve(matrix: Array, right: Array) -> Array:
@@ -91,7 +91,7 @@ def length(vector: Array) -> float:
 
 
 def smallest(matrix: Array, right: Array, share: float) -> Array:
-    """The smallest y that leaves least of matrix @ y - right, where singular values may vanish.
+    """Least-squares solution y of matrix @ y = right of minimum length; the matrix may be singular.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def least_squares(columns, turns, right, share, solution):
     is the unit matrix.
     """
     m, n = columns.shape
-    for _ in range(JACOBI_SWEEPS):
+    for _ in range(MAX_SWEEPS):
         turned = False
         for p in range(m):
             for q in range(p + 1, m):

@@ -2,16 +2,16 @@
 
 from sbs_sim.lanes import Vector, as_lanes, cross, rounded, spread, zeros_like
 from sbs_sim.model.dynamics import (
-    blade_terms,
     body_loads,
     body_motion,
-    body_rates,
-    hub_loads,
     in_lanes,
     memory_in_lanes,
-    rotor_rates,
     set_acceleration,
+    set_blade_terms,
+    set_body_rates,
+    set_hub_loads,
     set_hub_velocities,
+    set_rotor_rates,
     solve_blades,
     solve_blades_alone,
     sum_blades,
@@ -46,7 +46,7 @@ def steady_balance(model, x, swash, psi, wind, work, dx, imbalance):
     for i in range(given.shape[0]):
         memory.state[i] = given[i]
     flight = body_motion(aircraft, memory.state, as_lanes(wind, like))
-    blade_terms(aircraft, memory, flight, as_lanes(swash, like), as_lanes(psi, like))
+    set_blade_terms(aircraft, memory, flight, as_lanes(swash, like), as_lanes(psi, like))
     sum_blades(aircraft, memory)
     set_hub_velocities(aircraft, memory, flight)
     loads = body_loads(aircraft, memory, flight)
@@ -56,10 +56,10 @@ def steady_balance(model, x, swash, psi, wind, work, dx, imbalance):
         solve_blades(aircraft, memory)
     else:
         solve_blades_alone(aircraft, memory)
-    body_rates(memory, flight, rates)
-    rotor_rates(aircraft, memory, rates)
+    set_body_rates(memory, flight, rates)
+    set_rotor_rates(aircraft, memory, rates)
     hold_coordinates(aircraft, memory)
-    hub_loads(aircraft, memory)
+    set_hub_loads(aircraft, memory)
     total, body = with_hub_loads(aircraft, memory, loads), aircraft.body[0]
     set_vector(left, 0, total.force - steady * body.mass)
     set_vector(left, 3, total.moment - cross(body.first_moment, steady))

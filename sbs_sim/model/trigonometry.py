@@ -6,10 +6,10 @@ reason.
 
 import math
 
-from sbs_sim.lanes import any_lane, floor, greatest, inverse_root_guess, least, rounded, select, with_sign
+from sbs_sim.lanes import any_lane, floor, inverse_root_guess, maximum, minimum, rounded, select, with_sign
 from sbs_sim.model.kernel import kernel
 
-# Of z, z^3, z^5 ... of the arcsine for |z| <= sin 22.5 deg: the least largest relative error, 1.2e-16
+# Of z, z^3, z^5 ... of the arcsine for |z| <= sin 22.5 deg: minimax relative error 1.2e-16
 # (Remez exchange in 40 digits).
 Q0, Q1, Q2, Q3, Q4, Q5, Q6, Q7, Q8, Q9 = (
     0.9999999999999999,
@@ -69,7 +69,7 @@ def angle_of(y, x, inverse_length):
 @kernel
 def _any_angle(y, x, inverse_length):
     a, b = abs(x), abs(y)
-    low, high = least(b, a), greatest(b, a)
+    low, high = minimum(b, a), maximum(b, a)
     beyond = low > TANGENT_EIGHTH * high
     # arcsin of low / length, or 45 deg plus that of what is left
     angle = small_arcsine(select(beyond, (low - high) * ROOT_HALF, low) * inverse_length)

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 # columns of the wind of one tick
 STEADY, GUST, GUST_START, GUST_DURATION, TURBULENCE_FROM, TURBULENCE_TO = 0, 3, 6, 7, 8, 11
 WIND_SIZE = 14
-BLOCK = 10_000  # ticks that turbulence goes on by at once
+BLOCK = 10_000  # ticks by which turbulence is advanced at once
 MAX_WIND = 100.0  # m/s; the strongest wind measured at the ground is 113 m/s
 RANGES = {
     "gust_delay": (0.0, 1e6, "s"),
@@ -39,7 +39,7 @@ RANGES = {
 def wind_at(wind, time, fraction, out):
     """Velocity of the air, NED [m/s], at a time [s] that lies `fraction` of the way through the tick.
 
-    The gust is peak / 2 (1 - cos(2 pi (t - start) / duration)) (EASA CS-25.341 with time in place of distance).
+    The gust is peak / 2 (1 - cos(2 pi (t - start) / duration)) (EASA CS-25.341 with time instead of distance).
     """
     since, duration = time - wind[GUST_START], wind[GUST_DURATION]
     blowing = (duration > 0.0) & (since >= 0.0) & (since <= duration)
@@ -54,7 +54,7 @@ def wind_at(wind, time, fraction, out):
 
 @entry
 def winds_at(winds, times, like, out):
-    """What `wind_at` gives at the beginnings of ticks.
+    """Velocity of the air at the beginnings of ticks, see `wind_at`.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def winds_at(winds, times, like, out):
 
 @dataclass(frozen=True)
 class Wind:
-    """What the air does from now on.
+    """Motion of the air from now on.
 
     Parameters
     ----------
@@ -115,18 +115,20 @@ class Wind:
     def __post_init__(self) -> None:
         """Check every field, and make plain numbers of them, so that equal winds are equal."""
         for name in ("velocity", "gust", "turbulence_intensity"):
-            least = 0.0 if name == "turbulence_intensity" else -MAX_WIND
+            minimum = 0.0 if name == "turbulence_intensity" else -MAX_WIND
             values = getattr(self, name)
             if not isinstance(values, Sequence | np.ndarray) or len(values) != 3:
                 allowed = "allowed are 3 values, north, east, down [m/s]"
                 raise SimulationError(f"{name} = {checks.shown(values)}: {allowed}")
             numbers = [
-                checks.number(f"{name}.{axis}", value, least, MAX_WIND, "m/s", SimulationError)
+                checks.number(f"{name}.{axis}", value, minimum, MAX_WIND, "m/s", SimulationError)
                 for axis, value in zip("xyz", values, strict=True)
             ]
             object.__setattr__(self, name, tuple(numbers))
-        for name, (least, most, unit) in RANGES.items():
-            object.__setattr__(self, name, checks.number(name, getattr(self, name), least, most, unit, SimulationError))
+        for name, (minimum, maximum, unit) in RANGES.items():
+            object.__setattr__(
+                self, name, checks.number(name, getattr(self, name), minimum, maximum, unit, SimulationError)
+            )
         if any(self.gust) and not self.gust_duration > 0.0:
             raise SimulationError("gust_duration = 0: allowed is a length above 0 for a gust")
         seed = checks.whole("turbulence_seed", self.turbulence_seed, 0, 2**64 - 1, SimulationError)
@@ -248,7 +250,7 @@ def _noise_of_step(ratio: float) -> tuple[float, float, float]:
     """Cholesky factor (11, 21, 22) of the covariance that noise adds to z1, z2 in a step of length `ratio`.
 
     That is the integral of exp(-2 s) (1, s; s, s^2) over the step. For a short step the last diagonal element is
-    lost in rounding; zero stands for it then.
+    lost in rounding and is set to zero then.
     """
     decay = exponential(-2.0 * ratio)
     first = -exponential_less_one(-2.0 * ratio) / 2.0

@@ -1,11 +1,11 @@
-"""What each rotor is made to do: how far it is from what the model describes (theory.md section 6.1)."""
+"""Working state of each rotor, and how far it is outside of the validity of the model (theory.md section 6.1)."""
 
 from sbs_sim.lanes import (
     Vector,
     add_to_quads,
     as_lanes,
-    greatest,
-    least,
+    maximum,
+    minimum,
     select,
     sqrt,
     zeros_like,
@@ -41,17 +41,17 @@ def working_state(model, work, out):
     angles, rows = as_lanes(model.stall, aircraft.blades), as_lanes(out, aircraft.rotors)
     for r in range(aircraft.blades.shape[0]):
         blade = aircraft.blades[r]
-        found = shares(aircraft, blade, memory.terms[r], angles[r])
-        add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "force", found)
+        fractions = disc_fractions(aircraft, blade, memory.terms[r], angles[r])
+        add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "force", fractions)
     for j in range(aircraft.rotors.shape[0]):
         rotor, row, flow = aircraft.rotors[j], rows[j], memory.flow[j].velocity
         thrust, scale = memory.totals[j].thrust, rotor.inverse_tip_speed
-        sense = select(thrust >= 0.0, 1.0, -1.0)  # upside down, all that follows is
+        thrust_sign = select(thrust >= 0.0, 1.0, -1.0)  # a negative thrust turns the flow over
         through = flow.z * scale
         row[ADVANCE_RATIO] = sqrt(flow.x * flow.x + flow.y * flow.y) * scale
         row[HOVER_INFLOW] = rotor.duct_expansion * sqrt(2.0 * abs(thrust) * rotor.coefficient_scale)
-        row[DESCENT] = sense * through
-        row[FLOW] = sense * (memory.state[rotor.inflow] - through)
+        row[DESCENT] = thrust_sign * through
+        row[FLOW] = thrust_sign * (memory.state[rotor.inflow] - through)
         found, area = Vector(0.0, 0.0, 0.0), zeros_like(scale)
         for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
             own = memory.hubs[quad]
@@ -60,8 +60,8 @@ def working_state(model, work, out):
 
 
 @kernel
-def shares(aircraft, blade, terms, angles):
-    """Of the disc that blades sweep, up to a common factor: stalled, in reverse flow, outside of the table, and all."""
+def disc_fractions(aircraft, blade, terms, angles):
+    """Areas of the disc, up to a common factor: stalled, in reverse flow, outside of the airfoil table, and all."""
     air, elements = aircraft.air[0], aircraft.elements[blade.elements]
     area = stalled = reversed_ = outside = zeros_like(terms.pitch)
     for i in range(elements.shape[0]):
@@ -73,8 +73,8 @@ def shares(aircraft, blade, terms, angles):
         alpha = terms.pitch + element.twist - angle_of(up, ut, inverse_speed)
         reynolds = squared * inverse_speed * element.chord * air.inverse_viscosity
         low, high = (
-            between(angles[REYNOLDS], angles[LOWEST], reynolds),
-            between(angles[REYNOLDS], angles[HIGHEST], reynolds),
+            interpolated(angles[REYNOLDS], angles[LOWEST], reynolds),
+            interpolated(angles[REYNOLDS], angles[HIGHEST], reynolds),
         )
         backwards = ut <= 0.0
         attached = (alpha >= low) & (alpha <= high)
@@ -87,11 +87,11 @@ def shares(aircraft, blade, terms, angles):
 
 
 @kernel
-def between(places, values, place):
+def interpolated(knots, values, x):
     """Linear interpolation, constant beyond the ends."""
     found = values[0] + 0.0
-    for i in range(1, places.shape[0]):
-        width = places[i] - places[i - 1]
-        share = least(greatest((place - places[i - 1]) / select(width > 0.0, width, 1.0), 0.0), 1.0)
-        found = select(place > places[i - 1], values[i - 1] + share * (values[i] - values[i - 1]), found)
+    for i in range(1, knots.shape[0]):
+        width = knots[i] - knots[i - 1]
+        share = minimum(maximum((x - knots[i - 1]) / select(width > 0.0, width, 1.0), 0.0), 1.0)
+        found = select(x > knots[i - 1], values[i - 1] + share * (values[i] - values[i - 1]), found)
     return found

@@ -113,7 +113,7 @@ class Disturbed:
         return self.model.derivative(x, self.swash, psi, air)
 
     def flown(self, method, bounds=None):
-        """Steps made, the culprit, and the state after a tick of `advance`."""
+        """Steps made, the failed state, and the state after a tick of `advance`."""
         bounds = np.full(self.x.size + 1, np.inf) if bounds is None else bounds
         numbers = (self.first_step, self.steps, self.h)
         return self.model.tick(self.x, self.swash, self.psi0, *numbers, self.air, method, bounds)
@@ -133,8 +133,8 @@ def test_classical_steps_are_kuttas():
         k3 = flight.slope(x + h / 2 * k2, i + 0.5)
         k4 = flight.slope(x + h * k3, i + 1)
         x = unit_attitude(x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
-    done, culprit, found = flight.flown(RK4)
-    assert (done, culprit) == (flight.steps, -1)
+    done, failed_state, found = flight.flown(RK4)
+    assert (done, failed_state) == (flight.steps, -1)
     np.testing.assert_allclose(found, x, rtol=1e-11, atol=1e-13)
 
 
@@ -317,8 +317,8 @@ def test_a_tick_ends_before_what_is_implausible(state):
     bounds = np.full(flight.x.size + 1, np.inf)
     bounds[state] = 0.5 * abs(after[1][state] + after[2][state])
     assert abs(after[1][state]) < bounds[state] < abs(after[2][state])
-    done, culprit, x = flight.flown(RK4, bounds)
-    assert (done, culprit) == (1, state)
+    done, failed_state, x = flight.flown(RK4, bounds)
+    assert (done, failed_state) == (1, state)
     np.testing.assert_array_equal(x, after[1])
 
 

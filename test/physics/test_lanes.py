@@ -26,10 +26,10 @@ from sbs_sim.lanes import (
     cross,
     dot,
     floor,
-    greatest,
     inverse_root_guess,
-    least,
+    maximum,
     memory,
+    minimum,
     rounded,
     select,
     sqrt,
@@ -145,8 +145,8 @@ OTHERS = {
     "abs": lambda a, b: abs(a * b),
     "sqrt": lambda a: sqrt(a),
     "floor": lambda a: floor(a),
-    "least": lambda a, b: least(a, b),
-    "greatest": lambda a, b: greatest(a, b * 2.0),
+    "minimum": lambda a, b: minimum(a, b),
+    "maximum": lambda a, b: maximum(a, b * 2.0),
     "with_sign": lambda a, b: with_sign(a, b),
     "select": lambda a, b, c: select(a < b, a, c * 2.0),
     "masks": lambda a, b, c: select((a < b) & ~(b <= c) | (a >= c), 1.0, a),
@@ -186,8 +186,8 @@ def test_quotients_and_roots_are_rounded_once():
 
 EXACT_OTHERS = {
     "floor": (lambda a: floor(a), lambda a: math.floor(a)),
-    "least": (lambda a, b: least(a, b), min),
-    "greatest": (lambda a, b: greatest(a, b), max),
+    "minimum": (lambda a, b: minimum(a, b), min),
+    "maximum": (lambda a, b: maximum(a, b), max),
     "abs": (lambda a: abs(a), abs),
     "select": (lambda a, b, c: select(a < b, b, c), lambda a, b, c: b if a < b else c),
     "a b c": (lambda a, b, c: a * b * c, None),
@@ -255,9 +255,9 @@ def test_zeros_keep_the_signs_of_the_standard():
 
 def test_the_first_argument_survives_what_is_not_a_number():
     nan, one = Lanes([math.nan, 1.0]), Lanes([1.0, math.nan])
-    for function in (least, greatest):
+    for function in (minimum, maximum):
         assert alike(function(nan, one).values, [math.nan, 1.0])
-    both(lambda a, b: least(greatest(a, b), a), 2)
+    both(lambda a, b: minimum(maximum(a, b), a), 2)
 
 
 def test_a_product_of_what_is_rounded_differs_from_a_fused_one():

@@ -78,7 +78,7 @@ def test_multiblade_names(blades, suffixes, flap, lag):
 
 
 @pytest.mark.parametrize("blades", BLADES)
-def test_places_cover_the_state_once(blades):
+def test_indices_cover_the_state_once(blades):
     layout = StateLayout(blades)
     assert layout.blade_count == sum(blades)
     assert layout.size == BODY_SIZE + 4 * sum(blades) + 3 * len(blades)

@@ -161,16 +161,16 @@ class Model:
         return x
 
     def tick(self, x, swash, psi0, first_step, steps, h, air, method, bounds):
-        """Steps made, the culprit, and the state after a tick of `advance`."""
-        engine, culprit, x = self.engine, np.full(self.engine.n, FLYING), self.lanes(x)
+        """Steps made, the failed state, and the state after a tick of `advance`."""
+        engine, failed_state, x = self.engine, np.full(self.engine.n, FLYING), self.lanes(x)
         if method == ETD:
             matrices = rotor_matrices(self.aircraft, self.lead_lag, self.cyclic_inflow, h)
             engine = Engine(engine.model, method, arranged([matrices]))
         advance(
             *(engine.code.derivative, engine.model, x, self.lanes(swash), self.lanes(psi0), first_step, steps, h),
-            *(self.lanes(air), method, self.lanes(bounds), engine.work, engine.tick, engine.tick.done, culprit),
+            *(self.lanes(air), method, self.lanes(bounds), engine.work, engine.tick, engine.tick.done, failed_state),
         )
-        return int(engine.tick.done[0]), int(culprit[0]), x[:, 0].copy()
+        return int(engine.tick.done[0]), int(failed_state[0]), x[:, 0].copy()
 
     def azimuth(self, steps, h, psi0=0.0):
         """Return the azimuths of all rotors after steps of length h [s], shape (n_rotors,)."""

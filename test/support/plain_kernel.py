@@ -79,8 +79,8 @@ class PlainParams(NamedTuple):
         Station s of the middle, chord, chord times width, share kappa of (4.1), twist.
     airfoil : ndarray of AIRFOIL, shape (n_airfoils,)
         Index of the last Reynolds interval, step of the angles, which start at -pi.
-    reynolds : ndarray, shape (n_airfoils, most Reynolds numbers)
-    cl, cd : ndarray, shape (n_airfoils, most Reynolds numbers, most angles, 4)
+    reynolds : ndarray, shape (n_airfoils, max Reynolds numbers)
+    cl, cd : ndarray, shape (n_airfoils, max Reynolds numbers, max angles, 4)
         Coefficients of 1, x, x^2, x^3 from each angle to the next, x = 0 to 1.
     """
 
@@ -104,7 +104,7 @@ class PlainWork(NamedTuple):
         The system (6.5) of one rotor's inflow.
     blade : ndarray of BLADE, shape (n_blades,)
         c_beta and c_xi of (5.3), Q_beta, Q_xi and A_2 of (3.1).
-    cosine, sine : ndarray, shape (n_blades, most harmonics)
+    cosine, sine : ndarray, shape (n_blades, max harmonics)
         Of n psi_k, n = 1, 2, ...
     """
 
@@ -381,9 +381,9 @@ def rotor_terms(p, j, x, swash, psi, om, air, lead_lag, cyclic_inflow, work, dx)
     r = p.rotor[j]
     hub, u = vector(r.hub), vector(r.shaft)
     flow = add(air, cross(om, hub))
-    place = x.size - 3 * p.rotor.size + 3 * j
-    lambda0 = x[place]
-    lambdas, lambdac = (x[place + 1], x[place + 2]) if cyclic_inflow else (0.0, 0.0)
+    inflow = x.size - 3 * p.rotor.size + 3 * j
+    lambda0 = x[inflow]
+    lambdas, lambdac = (x[inflow + 1], x[inflow + 2]) if cyclic_inflow else (0.0, 0.0)
     thrust = moment_c = moment_s = 0.0
     for k in range(r.blades):
         lift, moment, cosine, sine = blade_terms(
@@ -395,7 +395,7 @@ def rotor_terms(p, j, x, swash, psi, om, air, lead_lag, cyclic_inflow, work, dx)
     duct = scaled((2 * r.duct_expansion - 1) * thrust, u)
     add_load(work.vector, duct, cross(hub, duct))
     inflow_rates(r, p.body[0].density, flow, lambda0, lambdas, lambdac, thrust, moment_c, moment_s, cyclic_inflow, work)
-    dx[place], dx[place + 1], dx[place + 2] = work.inflow[0], work.inflow[2], work.inflow[1]
+    dx[inflow], dx[inflow + 1], dx[inflow + 2] = work.inflow[0], work.inflow[2], work.inflow[1]
 
 
 @compiled

@@ -367,13 +367,13 @@ def airfoil_coefficients(airfoil, reynolds, alpha, interpolation):
     )
 
 
-def monotone_cubic(x, places, values):
-    """Return the value at x of the cubic Hermite interpolant of periodic values at even places (section 4.3)."""
-    count, step = len(places) - 1, places[1] - places[0]
-    j = min(int((x - places[0]) / step), count - 1)
+def monotone_cubic(x, knots, values):
+    """Return the value at x of the cubic Hermite interpolant of periodic values at equidistant knots (section 4.3)."""
+    count, step = len(knots) - 1, knots[1] - knots[0]
+    j = min(int((x - knots[0]) / step), count - 1)
     rises = [values[(j + i) % count + 1] - values[(j + i) % count] for i in (-1, 0, 1)]
     slopes = [limited_slope(*rises[:2]), limited_slope(*rises[1:])]
-    return CubicHermiteSpline([0.0, 1.0], values[j : j + 2], slopes)((x - places[j]) / step)
+    return CubicHermiteSpline([0.0, 1.0], values[j : j + 2], slopes)((x - knots[j]) / step)
 
 
 def limited_slope(before, after):

@@ -69,7 +69,7 @@ def own_folder():
 
 setup(
     name=PACKAGE,
-    version="0.1.0",
+    version="0.2.0",
     description="Flight simulator of a side-by-side helicopter on ROS 2",
     maintainer="sbs_sim maintainers",
     maintainer_email="sbs_sim@example.org",

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 GENERATOR = ROOT / ".cache" / "docs"  # not in the environment: it needs another docutils than that
 INSTALL = "./run python -m pip install --no-deps --target .cache/docs -r docs/requirements.txt"
 FONT = "ziamath/fonts/STIXTwoMath-Regular.ttf"
-COPIED = ("README.md", "CHANGELOG.md", "LICENSE", "docs", "config", "sbs_sim", "test/data")
+COPIED = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "docs", "config", "sbs_sim", "test/data")
 FIRST_PAGE = '<!DOCTYPE html><meta http-equiv="refresh" content="0; url=docs/index.html"><title>sbs_sim</title>\n'
 MODULE_LINK = re.compile(r"\[`(sbs_sim[\w.]*)`\]\(\.\./\.\./sbs_sim/[\w/]+\.py\)")
 

@@ -23,7 +23,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 import make_docs  # noqa: E402
 import update_reference as reference  # noqa: E402
 
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 NAMES = [page.relative_to(ROOT).as_posix() for page in PAGES]
 ROS = ("rclpy", "sbs_msgs", "geometry_msgs", "std_msgs", "std_srvs")
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -82,9 +82,9 @@ def test_examples_are_such_that_the_executables_take_them():
 
 @pytest.mark.parametrize("name", ["simulator", "cockpit", "sweep"])
 def test_every_executable_knows_its_version(name):
-    assert sbs_sim.__version__ == "0.1.0"
+    assert sbs_sim.__version__ == "0.2.0"
     result = call(INSTALLED / name, "--version")
-    assert (result.returncode, result.stdout, result.stderr) == (0, "sbs_sim 0.1.0\n", "")
+    assert (result.returncode, result.stdout, result.stderr) == (0, "sbs_sim 0.2.0\n", "")
 
 
 # -- suggestions -----------------------------------------------------------------------------------------------------
@@ -174,9 +174,9 @@ def test_the_one_command_has_every_executable_with_the_same_words():
 @pytest.mark.parametrize(
     ("words", "code", "out", "error"),
     [
-        (("--version",), 0, "sbs_sim 0.1.0\n", ""),
-        (("trim", "--version"), 0, "sbs_sim 0.1.0\n", ""),
-        (("simulator", "--version"), 0, "sbs_sim 0.1.0\n", ""),
+        (("--version",), 0, "sbs_sim 0.2.0\n", ""),
+        (("trim", "--version"), 0, "sbs_sim 0.2.0\n", ""),
+        (("simulator", "--version"), 0, "sbs_sim 0.2.0\n", ""),
         (("tirm",), 2, "", "sbs-sim: no 'tirm'; did you mean trim?\n"),
         ((), 2, "", "usage: sbs-sim NAME"),
         (("trim", "--help"), 0, "usage: sbs-sim trim ", ""),

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import json
+import re
 import subprocess
 import sys
 import sysconfig
@@ -83,7 +84,7 @@ def call(environment, *words, **more):
 
 def test_one_command_gets_into_the_path(environment):
     assert environment[1] == {"sbs-sim"}
-    assert call(environment, "sbs-sim", "--version").stdout == "sbs_sim 0.1.0\n"
+    assert call(environment, "sbs-sim", "--version").stdout == "sbs_sim 0.2.0\n"
 
 
 def test_it_trims_where_nothing_else_is(environment, sbs, tmp_path):
@@ -128,3 +129,16 @@ def test_everything_that_is_shipped_is_found_there(environment):
 def test_a_refusal_is_one_line_there_too(environment):
     result = call(environment, "python", "-m", "sbs_sim", "trim", "--aircraft", "nothing")
     assert result.stderr == "aircraft = 'nothing': allowed are a file's path or one of sbs, sbs_paper\n"
+
+
+def test_every_file_names_the_same_version():
+    text = {
+        name: (ROOT / name).read_text() for name in ("setup.py", "package.xml", "msg_defs/package.xml", "CITATION.cff")
+    }
+    (version,) = re.findall(r'^    version="([\d.]+)"', text["setup.py"], re.MULTILINE)
+    assert re.findall(r"<version>(.*)</version>", text["package.xml"]) == [version]
+    assert re.findall(r"<version>(.*)</version>", text["msg_defs/package.xml"]) == [version]
+    assert re.findall(r"^version: (.*)$", text["CITATION.cff"], re.MULTILINE) == [version]
+    assert re.search(
+        rf"^## {re.escape(version)} - \d{{4}}-\d\d-\d\d$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE
+    )

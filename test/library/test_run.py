@@ -126,7 +126,7 @@ def test_unknown_executable_is_told_without_building(clone, name, meant):
 
 
 def test_version_and_completion_need_nothing(clone):
-    assert clone.call("--version").stdout == "sbs_sim 0.1.0\n"
+    assert clone.call("--version").stdout == "sbs_sim 0.2.0\n"
     printed = clone.call("completion").stdout
     path = shlex.split(printed)
     assert path == ["source", str(clone.folder / "config" / "completion.bash")]  # a folder with a blank in its name

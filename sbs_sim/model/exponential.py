@@ -15,8 +15,6 @@ from sbs_sim.model.kernel import entry, kernel
 
 Array = NDArray[np.float64]
 
-STAGES = 4
-COEFFICIENTS = STAGES * (STAGES + 1) // 2
 TERMS = 16  # of Taylor's series
 MAX_NORM = 0.5  # row sum norm up to which it is used: the last term is then below the last bit
 

@@ -34,7 +34,7 @@ FEW = settings(
 )
 
 
-@pytest.mark.parametrize("target", fuzz_targets.TARGETS, ids=lambda target: target.name)
+@pytest.mark.parametrize("target", fuzz_targets.FUZZ_TARGETS, ids=lambda target: target.name)
 def test_nonsense_is_taken_or_refused_in_good_order(target):
     push(target)
 
@@ -291,6 +291,6 @@ def test_the_tool_pushes_through_every_target(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["fuzz.py", "--inputs", "60", "--no-nodes", "--seed", "3"])
     code, printed = fuzz.main(), capsys.readouterr().out
     assert code == 0, printed
-    for target in fuzz_targets.TARGETS:
+    for target in fuzz_targets.FUZZ_TARGETS:
         assert target.name in printed
     assert "nothing wrong" in printed

@@ -986,7 +986,7 @@ def call_command(name: str, words: list[str]) -> tuple[Any, str, str]:
         return (code or 0), out.getvalue(), err.getvalue()
 
 
-TARGETS = (
+FUZZ_TARGETS = (
     FuzzTarget("trim, linearize, sweep", TRIMS, check_trim, 3.0),
     FuzzTarget("Simulation, simulate", SIMULATIONS, check_simulation, 3.0),
     FuzzTarget("Wind", WINDS, check_wind, 2.0),

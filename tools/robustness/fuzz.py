@@ -61,7 +61,7 @@ def main() -> int:
     with contextlib.ExitStack() as stack:
         live = None if arguments.no_nodes else stack.enter_context(_running())
         every = [
-            *fuzz_targets.TARGETS,
+            *fuzz_targets.FUZZ_TARGETS,
             *((*live.targets(), *live.pilots.targets(), *live.page.targets()) if live else ()),
         ]
         whole = sum(target.share for target in every)

@@ -1,6 +1,6 @@
-"""Checks of what comes from outside: each returns the value as it is wanted, or raises one line that refuses it.
+"""Checks of input: each returns the value with the wanted type, or raises an exception of one line.
 
-The line names the field, its value and what is allowed; the caller chooses the exception.
+The line names the field, its value and the allowed range; the caller chooses the class of the exception.
 """
 
 import numbers
@@ -17,28 +17,28 @@ from sbs_sim.errors import SbsError
 
 Kind = type[SbsError]
 
-LONGEST = 60  # characters of a value that are shown
+MAX_SHOWN = 60  # characters of a value in a message
 
 
-def number(name: str, value: Any, least: float, most: float, unit: str, error: Kind) -> float:
-    """A number from `least` to `most`, ends included; neither a text that looks like one nor a truth value."""
+def number(name: str, value: Any, minimum: float, maximum: float, unit: str, error: Kind) -> float:
+    """A number from `minimum` to `maximum`, ends included; strings and booleans are refused."""
     plain = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
     is_number = isinstance(plain, numbers.Real) and not isinstance(plain, bool)
-    if not (is_number and least <= plain <= most):  # false for a NaN as well
-        raise error(f"{name} = {shown(value)}: allowed are {least:g} to {most:g}{f' {unit}' if unit else ''}")
+    if not (is_number and minimum <= plain <= maximum):  # false for a NaN as well
+        raise error(f"{name} = {shown(value)}: allowed are {minimum:g} to {maximum:g}{f' {unit}' if unit else ''}")
     return float(plain)
 
 
-def whole(name: str, value: Any, least: int, most: int, error: Kind) -> int:
-    """A whole number from `least` to `most`, ends included."""
-    is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
-    if not (is_whole and least <= value <= most):
-        raise error(f"{name} = {shown(value)}: allowed are whole numbers from {least} to {most}")
+def whole(name: str, value: Any, minimum: int, maximum: int, error: Kind) -> int:
+    """An integer from `minimum` to `maximum`, ends included."""
+    is_integer = isinstance(value, numbers.Integral) and not isinstance(value, bool)
+    if not (is_integer and minimum <= value <= maximum):
+        raise error(f"{name} = {shown(value)}: allowed are whole numbers from {minimum} to {maximum}")
     return int(value)
 
 
 def flag(name: str, value: Any, error: Kind) -> bool:
-    """True or False, also as 1 or 0; no text, of which "no" would be true."""
+    """True or False, also as 1 or 0; strings are refused, since "no" would count as true."""
     if not (isinstance(value, bool | np.bool_ | numbers.Integral) and value in (0, 1)):
         raise error(f"{name} = {shown(value)}: allowed are True and False")
     return bool(value)
@@ -58,14 +58,14 @@ def instance(name: str, value: Any, kind: type, error: Kind) -> None:
 
 
 def path(name: str, value: Any, error: Kind) -> Path:
-    """A path as text or as an object."""
+    """A path as a string or a path object."""
     if not isinstance(value, str | os.PathLike):
         raise error(f"{name} = {shown(value)}: allowed are paths")
     return Path(value)
 
 
 def array(name: str, value: Any, error: Kind) -> NDArray[np.float64]:
-    """A copy of numbers in any shape; NaN and infinity are numbers too, texts are not."""
+    """A copy of numbers in any shape; NaN and infinity are allowed, strings are not."""
     try:
         found = np.array(value)
     except (TypeError, ValueError, OverflowError, RecursionError):  # lists of unequal lengths, objects of any kind
@@ -76,16 +76,16 @@ def array(name: str, value: Any, error: Kind) -> NDArray[np.float64]:
 
 
 def shown(value: Any) -> str:
-    """A value as a line can hold it: on one line, and not too long, however large it is."""
+    """A value on one line of at most `MAX_SHOWN` characters."""
     if isinstance(value, np.generic):
         value = value.item()
     try:
         text = _SHORT.repr(value)
-    except Exception:  # what is foreign may fail to describe itself
+    except Exception:  # `repr` of a foreign object may raise anything
         text = f"<{type(value).__name__}>"
     text = " ".join(text.split())
-    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."
 
 
 _SHORT = reprlib.Repr()
-_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 10 * LONGEST  # beyond, they cut in the middle
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 10 * MAX_SHOWN  # beyond, they cut in the middle

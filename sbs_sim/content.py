@@ -1,4 +1,4 @@
-"""Equality and hash by content for dataclasses that hold arrays, which Python's own cannot compare."""
+"""Equality and hash by content for dataclasses with arrays, for which those of Python fail."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -8,10 +8,10 @@ import numpy as np
 
 
 class ByContent:
-    """Base of dataclasses with `eq=False`: equal are two of one class whose fields hold the same.
+    """Base of dataclasses with `eq=False`: two objects of one class are equal if all their fields are equal.
 
-    Arrays are the same with one shape and equal elements, a NaN being equal to a NaN; fields with `compare=False` do
-    not count. Equal objects have equal hashes, as long as nobody writes into their arrays.
+    Arrays are equal if they have the same shape and equal elements; NaN equals NaN. Fields with `compare=False` do not
+    count. Equal objects have equal hashes, as long as nobody writes into their arrays.
     """
 
     def __eq__(self, other: object) -> bool:
@@ -30,7 +30,7 @@ def _compared(record: Any) -> list[str]:
 
 
 def same(one: Any, other: Any) -> bool:
-    """True for equal values, arrays among them; lists and tuples of equal items are equal."""
+    """True for equal values, arrays included; a list equals a tuple with equal items."""
     if one is other:
         return True
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
@@ -53,7 +53,7 @@ def _is_nan(value: Any) -> bool:
 
 
 def _hashable(value: Any) -> Any:
-    """What has the same hash for values that `same` finds equal."""
+    """A hashable object that is equal for values that `same` finds equal."""
     if isinstance(value, np.ndarray):
         return (value.shape, _bytes(value) if value.dtype.kind in "biufc" else _hashable(value.ravel().tolist()))
     if isinstance(value, Mapping):
@@ -64,7 +64,7 @@ def _hashable(value: Any) -> Any:
 
 
 def _bytes(numbers: np.ndarray[Any, Any]) -> bytes:
-    """The same for equal numbers of any type: there is one zero, and one NaN."""
+    """Bytes that are equal for equal numbers of any type; both zeros are equal, and all NaN."""
     values = numbers.astype(np.complex128) + 0.0
     values[np.isnan(values)] = np.nan
     return values.tobytes()

@@ -27,7 +27,7 @@ def problems(data: Any, validator: Any) -> list[str]:
         As read from YAML.
     validator : jsonschema validator
     """
-    if fault := _size_fault(data):  # first: all else goes through the whole of it
+    if fault := _size_fault(data):  # first: the checks below visit every value
         return [fault]
     errors = sorted(validator.iter_errors(data), key=lambda error: list(map(str, error.path)))
     # only in data that the schema accepts is the search for numbers that are not finite sure to end

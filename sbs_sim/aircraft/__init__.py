@@ -1,6 +1,6 @@
-"""Aircraft: files of YAML, checked, as frozen dataclasses, and as the records of the compiled model.
+"""Aircraft: read from YAML files, checked, held as frozen dataclasses, and made into records of the compiled model.
 
-`sbs_sim.aircraft.description` declares the values of a file; `sbs_sim.aircraft.declaration` tells how to add one.
+`sbs_sim.aircraft.description` declares the values of a file. To add a value see `sbs_sim.aircraft.declaration`.
 """
 
 from __future__ import annotations  # `help` then shows types by their names

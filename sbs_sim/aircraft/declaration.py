@@ -13,7 +13,7 @@ model takes the value as it is, `model_field` names the field of `sbs_sim.model.
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Any, TypeVar
 
@@ -95,8 +95,8 @@ class Declaration:
 
     @property
     def internal_default(self) -> Any:
-        """Internal value of the default; MISSING for a key that each file needs."""
-        return MISSING if self.is_required else self.read(self.default)
+        """Internal value of the default; REQUIRED for a key that each file needs."""
+        return REQUIRED if self.is_required else self.read(self.default)
 
     def read_from(self, data: Mapping[str, Any]) -> Any:
         """Internal value from the checked mapping of the part."""
@@ -164,7 +164,11 @@ def parts(text: str, record: type, minimum: int, maximum: int, **more: Any) -> A
 def declared(text: str, schema: Mapping[str, Any], reader: Callable[[Any], Any], **more: Any) -> Any:
     """Field of a dataclass with a declaration; `more` are further attributes of `Declaration`."""
     declaration = Declaration(text, schema, reader, **more)
-    return field(metadata={METADATA_KEY: declaration}, kw_only=True, default=declaration.internal_default)
+    metadata = {METADATA_KEY: declaration}
+    if declaration.is_required:
+        return field(kw_only=True, metadata=metadata)
+    default = declaration.internal_default
+    return field(kw_only=True, metadata=metadata, default_factory=lambda: default)  # for arrays, too
 
 
 # -- building blocks -----------------------------------------------------------------------------------

@@ -1,7 +1,8 @@
-"""What an aircraft file describes: one declared field for each value, in SI units and radians internally.
+"""What an aircraft file describes: one declared field for each value.
 
-A field's declaration has all that is known of the value: type, range, unit, symbol, meaning, default. Ranges are in the
-units of the file. `sbs_sim.aircraft.declaration` tells how to add a value.
+A declaration holds type, range, unit, symbol, meaning and default of a value; range, unit and default are those of the
+file. The attributes are in SI units and radians; docs/reference/aircraft.md lists them all. To add a value see
+`sbs_sim.aircraft.declaration`.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The compiled model's records of one aircraft, a single lane everywhere; `sbs_sim.model.packing` arranges them."""
+"""Records of the compiled model for one aircraft, each with a single lane; `sbs_sim.model.packing` arranges them."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -117,7 +117,7 @@ def second_moment(aircraft: "Aircraft", rotor: Rotor) -> float:
 def _blade_values(
     aircraft: "Aircraft", rotor: Rotor, number: int, airfoil: AirfoilTable, first_row: int
 ) -> dict[str, Any]:
-    """Values of a blade, without the integers."""
+    """Values of a blade's record except the integers."""
     columns, first_angle, inverse_step = cell_grid(airfoil)
     cos_phase, sin_phase = cosine_and_sine(rotor.swashplate_phase)
     cos_azimuth_offset, sin_azimuth_offset = cosine_and_sine(2.0 * math.pi * number / rotor.blades)

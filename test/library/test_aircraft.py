@@ -1055,7 +1055,7 @@ def test_values_that_are_possible_together_only_are_taken_in_any_order(sbs):
     assert sbs.with_values({}) == sbs
 
 
-def test_of_two_paths_to_one_place_the_later_counts(sbs):
+def test_of_two_paths_to_one_value_the_later_counts(sbs):
     variant = sbs.with_values({"rotors.radius": 0.6, "rotors.MR2.radius": 0.55})
     assert [rotor.radius for rotor in variant.rotors] == [0.6, 0.55]
 
@@ -1073,7 +1073,7 @@ def test_a_product_of_inertia_is_one_value(sbs, i, j):
         sbs.with_values(both)
 
 
-def test_what_is_impossible_together_is_told_with_all_that_was_changed(sbs):
+def test_an_impossible_combination_is_refused_with_all_changes_named(sbs):
     with pytest.raises(AircraftError) as caught:
         sbs.with_values({"rotors.radius": 0.4, "body.mass": 21.0})
     assert str(caught.value).startswith(

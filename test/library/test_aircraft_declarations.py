@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.aircraft.declaration import declarations, interval, leaves, number, parts, schema_of
+from sbs_sim.aircraft.declaration import array, declarations, interval, leaves, number, parts, schema_of
 from sbs_sim.aircraft.description import Body, Description, Environment, Options, Rotor
 from sbs_sim.aircraft.paths import separate, unit_of
 from sbs_sim.errors import AircraftError
@@ -108,10 +108,10 @@ def test_the_model_holds_the_declared_values(name, request):
     model = aircraft.model()
     held = set()
     blade_of = np.cumsum([0, *(rotor.blades for rotor in aircraft.rotors)])
-    places = [(model.air[0], records.AIR, part) for part in (aircraft.environment, aircraft.body)]
+    pairs = [(model.air[0], records.AIR, part) for part in (aircraft.environment, aircraft.body)]
     for j, rotor in enumerate(aircraft.rotors):
-        places += [(model.rotors[j], records.ROTOR, rotor), (model.blades[blade_of[j]], records.BLADE, rotor)]
-    for record, fields, part in places:
+        pairs += [(model.rotors[j], records.ROTOR, rotor), (model.blades[blade_of[j]], records.BLADE, rotor)]
+    for record, fields, part in pairs:
         for attribute, declaration in declarations(type(part)).items():
             if declaration.model_field in fields:
                 assert np.array_equal(record[declaration.model_field][..., 0], getattr(part, attribute))
@@ -129,10 +129,11 @@ def test_gravity_has_the_unit_of_all_accelerations():
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StoppedRotor(Rotor):
-    """A rotor with lag stops: three more declarations, and nothing else."""
+    """A rotor with lag stops: four more declarations, and nothing else."""
 
     lag_stop: float = number("Lag angle at which the stop begins", 0, 90, "deg", symbol=r"\xi_s", default=90)
     stop_spring: float = number("Stiffness of the lag stop", 0, 1e6, "N m/rad", key="stop.spring", default=0.0)
+    stop_axis: np.ndarray = array("Axis of the stop", -1, 1, "1", shape=(3,), default=[0, 0, 1])
     stop_range: tuple[float, float] = interval("Travel of the stop", -10, 10, "deg", default=[-1, 1], is_physics=False)
 
 
@@ -151,6 +152,7 @@ def stopped(sbs):
 def test_a_value_that_is_left_out_has_its_default_and_the_hash_stays(stopped, sbs):
     rotor = stopped.rotors[0]
     assert (rotor.lag_stop, rotor.stop_spring) == (math.radians(90), 0.0)
+    assert rotor.stop_axis.tolist() == [0.0, 0.0, 1.0]
     assert rotor.stop_range == pytest.approx((-math.pi / 180, math.pi / 180))
     assert stopped.parameter_hash == sbs.parameter_hash
     assert stopped.with_value("rotors.stop_range_deg", [-2, 2]).parameter_hash == sbs.parameter_hash
@@ -163,6 +165,7 @@ def test_one_declaration_adds_a_value_to_files_checks_and_changes(stopped, sbs):
     assert aircraft.rotors[0].lag_stop == math.radians(12)
     assert aircraft.rotors[0].stop_spring == 300.0
     assert aircraft.parameter_hash != sbs.parameter_hash
+    assert stopped.with_value("rotors.stop_axis", [0, 1, 0]).parameter_hash != sbs.parameter_hash
     changed = stopped.with_value("rotors.MR1.lag_stop_deg", 12).with_value("rotors[0].stop", {"spring": 300})
     assert changed.rotors == aircraft.rotors
     assert changed.value("rotors.MR1.lag_stop_deg") == 12

@@ -29,7 +29,7 @@ def number(name: str, value: Any, minimum: float, maximum: float, unit: str, err
     return float(plain)
 
 
-def whole(name: str, value: Any, minimum: int, maximum: int, error: Kind) -> int:
+def integer(name: str, value: Any, minimum: int, maximum: int, error: Kind) -> int:
     """An integer from `minimum` to `maximum`, ends included."""
     is_integer = isinstance(value, numbers.Integral) and not isinstance(value, bool)
     if not (is_integer and minimum <= value <= maximum):

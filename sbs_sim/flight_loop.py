@@ -208,7 +208,7 @@ class FlightLoop:
 
     def step(self, ticks: int) -> float:
         """Fly some ticks while paused and return the simulation time [s] after them."""
-        ticks = checks.whole("ticks", ticks, 1, MAX_STEP_TICKS, SimulationError)
+        ticks = checks.integer("ticks", ticks, 1, MAX_STEP_TICKS, SimulationError)
         left = ticks
         while left:
             left, time_after = self.call(functools.partial(self._some_ticks, left))

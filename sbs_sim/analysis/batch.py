@@ -236,7 +236,7 @@ def _plan(cases: Sequence[Case], duration: float, every: int, outputs: Sequence[
     _check_cases(cases)
     duration = checks.number("duration", duration, 0.0, 1e6, "s", BatchError)
     options["tick"] = checks.number("tick", options["tick"], 1e-4, 1.0, "s", BatchError)
-    every = checks.whole("every", every, 1, MAX_TICKS, BatchError)
+    every = checks.integer("every", every, 1, MAX_TICKS, BatchError)
     allowed = ("tick", "azimuth_step", "method", "ground_altitude", "actuators", *FIDELITY)
     unknown = [name for name in options if name not in allowed]
     if unknown:

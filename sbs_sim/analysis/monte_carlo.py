@@ -69,8 +69,8 @@ def gust_cases(
     """
     checks.instance("aircraft", aircraft, Aircraft, BatchError)
     checks.instance("condition", condition, Mapping, BatchError)
-    flights = checks.whole("flights", flights, 1, MAX_FLIGHTS, BatchError)
-    seed = checks.whole("seed", seed, 0, 2**64 - 1, BatchError)
+    flights = checks.integer("flights", flights, 1, MAX_FLIGHTS, BatchError)
+    seed = checks.integer("seed", seed, 0, 2**64 - 1, BatchError)
     spread = {} if spread is None else spread
     checks.instance("spread", spread, Mapping, BatchError)
     centres = {path: (_centre(aircraft, path), _checked_share(path, share)) for path, share in spread.items()}

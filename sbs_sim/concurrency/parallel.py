@@ -115,7 +115,7 @@ def checked_workers(workers: int | None, dask: object, error: type[SbsError]) ->
         return len(os.sched_getaffinity(0))
     if dask is not None:
         raise error(f"workers = {checks.shown(workers)}: not allowed with dask, whose workers are those of the cluster")
-    return checks.whole("workers", workers, 1, MAX_WORKERS, error)
+    return checks.integer("workers", workers, 1, MAX_WORKERS, error)
 
 
 def _pool(workers: int, dask: "str | distributed.Client | None") -> AbstractContextManager[Pool]:

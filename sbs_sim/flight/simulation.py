@@ -173,8 +173,8 @@ class Simulation:
         SimulationError
             The start is before its wind, or long after it.
         """
-        checks.whole("wind_step", start.wind_step, 0, start.step, SimulationError)
-        checks.whole("wind_ticks", start.wind_ticks, 0, MAX_WIND_TICKS, SimulationError)
+        checks.integer("wind_step", start.wind_step, 0, start.step, SimulationError)
+        checks.integer("wind_ticks", start.wind_ticks, 0, MAX_WIND_TICKS, SimulationError)
         self.step, self._wind_step = start.step, start.wind_step
         self._field = WindField(self.wind, start.wind_step * self.step_size, self.tick)
         self._air = self._field.tick_number(max(1, start.wind_ticks))

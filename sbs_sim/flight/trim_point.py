@@ -119,7 +119,7 @@ class Fidelity:
         """Check the values."""
         for name in ("lead_lag", "cyclic_inflow"):
             object.__setattr__(self, name, checks.flag(name, getattr(self, name), TrimError))
-        count = checks.whole("azimuth_count", self.azimuth_count, 1, MAX_AZIMUTH_COUNT, TrimError)
+        count = checks.integer("azimuth_count", self.azimuth_count, 1, MAX_AZIMUTH_COUNT, TrimError)
         object.__setattr__(self, "azimuth_count", count)
 
 

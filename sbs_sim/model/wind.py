@@ -131,7 +131,7 @@ class Wind:
             )
         if any(self.gust) and not self.gust_duration > 0.0:
             raise SimulationError("gust_duration = 0: allowed is a length above 0 for a gust")
-        seed = checks.whole("turbulence_seed", self.turbulence_seed, 0, 2**64 - 1, SimulationError)
+        seed = checks.integer("turbulence_seed", self.turbulence_seed, 0, 2**64 - 1, SimulationError)
         object.__setattr__(self, "turbulence_seed", seed)
 
 

@@ -67,7 +67,7 @@ def simulate_with_pilot(
         See `Simulation`, `Mixer.set_target`.
     """
     checks.instance("aircraft", aircraft, Aircraft, PilotError)
-    delay = checks.whole("delay", delay, 0, MAX_DELAY, PilotError)
+    delay = checks.integer("delay", delay, 0, MAX_DELAY, PilotError)
     duration = checks.number("duration", duration, 0.0, 1e6, "s", PilotError)
     if not callable(pilot):
         raise PilotError(f"pilot = {checks.shown(pilot)}: allowed are functions of time and state")

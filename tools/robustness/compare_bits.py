@@ -13,8 +13,8 @@ the flight by itself. Digests of what stands on eigenvalues of LAPACK are shown,
 import argparse
 import contextlib
 import hashlib
-import math
 import itertools
+import math
 import os
 import subprocess
 import sys

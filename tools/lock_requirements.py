@@ -1,4 +1,4 @@
-"""Write the files of requirements/*.txt with the hashes of everything that may be installed for them: *.lock.
+"""Lock requirements/*.txt and docs/requirements.txt: write *.lock with the hashes of everything that may be installed.
 
     ./run python tools/lock_requirements.py
 
@@ -11,17 +11,17 @@ import subprocess
 import sys
 from pathlib import Path
 
-REQUIREMENTS = Path(__file__).resolve().parents[1] / "requirements"
-OLDEST_PYTHON = "3.10"
+ROOT = Path(__file__).resolve().parents[1]
+OLDEST_PYTHON = {"requirements": "3.10", "docs": "3.11.5"}  # of the folders of the files
 OPTIONS = ("--generate-hashes", "--no-deps", "--universal", "--no-annotate", "--no-header", "--quiet")
 
 
 def main() -> int:
     """Lock every file; the exit code of the first that fails."""
-    for source in sorted(REQUIREMENTS.glob("*.txt")):
-        target = source.with_suffix(".lock")
-        command = ["uv", "pip", "compile", source.name, *OPTIONS, "--python-version", OLDEST_PYTHON, "-o", target.name]
-        ended = subprocess.run(command, cwd=REQUIREMENTS, check=False)
+    for source in (*sorted((ROOT / "requirements").glob("*.txt")), ROOT / "docs" / "requirements.txt"):
+        target, oldest = source.with_suffix(".lock"), OLDEST_PYTHON[source.parent.name]
+        command = ["uv", "pip", "compile", source.name, *OPTIONS, "--python-version", oldest, "-o", target.name]
+        ended = subprocess.run(command, cwd=source.parent, check=False)
         if ended.returncode:
             return ended.returncode
         print(f"{target.name}: {target.read_text().count('==')} packages, {target.read_text().count('--hash')} files")

@@ -137,7 +137,7 @@ def test_an_address_where_nobody_answers_is_told_in_one_line(sbs):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # it does not listen
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
-        for wrong in (address, "nonsense", "", 3):
+        for wrong in (address, "invalid", "", 3):
             with pytest.raises(ClusterError) as caught:
                 sweep(sbs, "airspeed", [0.0], dask=wrong)
             assert str(caught.value) == f"dask = {wrong!r}: no scheduler answers there; allowed are tcp://HOST:PORT"

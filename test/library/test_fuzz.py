@@ -35,7 +35,7 @@ FEW = settings(
 
 
 @pytest.mark.parametrize("target", fuzz_targets.FUZZ_TARGETS, ids=lambda target: target.name)
-def test_nonsense_is_taken_or_refused_in_good_order(target):
+def test_invalid_input_is_taken_or_refused_in_good_order(target):
     push(target)
 
 
@@ -141,7 +141,7 @@ def test_a_joystick_file_is_read_with_the_same_care(tmp_path):
     assert line.endswith("allowed are 10000")
 
 
-def test_pilots_and_page_stand_nonsense_and_fly_on(tmp_path):
+def test_pilots_and_page_survive_invalid_input_and_fly_on(tmp_path):
     """Running nodes: messages, bytes that are none, keys, requests, presses."""
     pytest.importorskip("rclpy")
     pytest.importorskip("viser")

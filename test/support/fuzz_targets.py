@@ -68,7 +68,7 @@ class FuzzTarget:
     share: float = 1.0
 
 
-# --- nonsense ---------------------------------------------------------------------------------------------------
+# --- invalid input ---------------------------------------------------------------------------------------------------
 
 EXTREMES = (
     0.0,
@@ -732,7 +732,7 @@ def use_log(path: Path, draw: bool) -> None:
 
 
 def check_foreign(given: dict[str, Any]) -> None:
-    """A whole log, every checksum right, whose contents are nonsense."""
+    """A whole log, every checksum right, whose contents are invalid."""
     with scratch() as folder:
         path = folder / "foreign.mcap"
         with contextlib.suppress(SbsError), _writer(path, given) as log:

@@ -68,7 +68,7 @@ INTEGERS = {f"{sign}int{bits}": (bits, not sign) for sign in ("", "u") for bits 
 
 
 def messages(kind: Any, rate: int = 3) -> Any:
-    """Messages of an interface of which one field in `rate` is nonsense and the others are as they begin."""
+    """Messages of an interface of which one field in `rate` is invalid and the others are as they begin."""
 
     @st.composite
     def made(draw: Any) -> Any:
@@ -121,7 +121,7 @@ class Live:
         self.process = process
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=domain)
-        self.node = Node("nonsense", context=self._context)
+        self.node = Node("invalid", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self.states = self.wrong = 0
@@ -264,7 +264,7 @@ ENDING_KEYS = b"q\x03\x04\x1a\x1c"  # and those that a terminal makes signals of
 
 
 class Pilots:
-    """Pilots and a cockpit beside a flight that hear nothing but nonsense, on topics of their own.
+    """Pilots and a cockpit beside a flight that hear nothing but invalid input, on topics of their own.
 
     Parameters
     ----------
@@ -274,21 +274,21 @@ class Pilots:
 
     def __init__(self, made: World) -> None:
         self._client, self._folder = made.client, made.folder
-        own = [f"{name}:=nonsense/{name}" for name in HEARD]
+        own = [f"{name}:=invalid/{name}" for name in HEARD]
         self.parts: dict[str, Any] = {
-            name: made.start(name, remaps=[*own, f"controls:=nonsense/{name}"]) for name in PILOTS[:-1]
+            name: made.start(name, remaps=[*own, f"controls:=invalid/{name}"]) for name in PILOTS[:-1]
         }
         with socket.create_server(("127.0.0.1", 0)) as free:
             self.port = free.getsockname()[1]
         arguments = ["--attach", "--port", str(self.port)]
         self.parts["cockpit"] = made.start("cockpit", remaps=own, arguments=arguments)
-        words = [word for remap in [*own, "controls:=nonsense/teleop"] for word in ("-r", remap)]
+        words = [word for remap in [*own, "controls:=invalid/teleop"] for word in ("-r", remap)]
         self.parts["teleop"] = Terminal(made.domain, made.folder, *words)
         latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._outputs = {
-            name: made.client.node.create_publisher(kind, f"nonsense/{name}", latched) for name, kind in HEARD.items()
+            name: made.client.node.create_publisher(kind, f"invalid/{name}", latched) for name, kind in HEARD.items()
         }
-        self._given = {name: made.client.watch(f"nonsense/{name}", Controls) for name in PILOTS}
+        self._given = {name: made.client.watch(f"invalid/{name}", Controls) for name in PILOTS}
         self._time = 0
         made.client.until(lambda: all(output.get_subscription_count() for output in self._outputs.values()), "pilots")
         made.client.until(lambda: served(self.port), "the page")
@@ -415,7 +415,7 @@ class Page:
         self.check_alive()
 
     def check_press(self, given: tuple[int, str, Any]) -> None:
-        """What a page sends, with nonsense in it."""
+        """What a page sends, with invalid values in it."""
         place, kind, value = given
         part = self._parts[place % len(self._parts)]
         message: Any = {"type": kind, "uuid": part, "updates": {"value": value}}

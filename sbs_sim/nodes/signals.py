@@ -17,9 +17,16 @@ def when_interrupted(act: Callable[..., object]) -> None:
 
 
 def ignore_interruptions() -> None:
-    """Ignore interruptions from now on: the process is ending."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    """Ignore interruptions from now on: the process is ending.
+
+    Python prints an error for one that arrives while its handler is replaced, so they are blocked meanwhile: this lets
+    those that came before act.
+    """
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
+    for number in numbers:
         signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def note_interruptions(interruptions: list[int]) -> None:

@@ -17,7 +17,7 @@ from sbs_sim.aircraft.paths import separate, unit_of
 from sbs_sim.errors import AircraftError
 from sbs_sim.model import records
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 import make_schema  # noqa: E402
 import update_reference as reference  # noqa: E402

@@ -514,7 +514,9 @@ def test_a_flight_as_fast_as_it_goes_comes_again_and_nothing_is_left_out(tmp_pat
     path = fly(tmp_path, lambda made: wiggle(made, hover, 0.5), real_time_factor=0.0)
     assert_identical(path)
     log = read(path)
-    assert np.all(np.diff(log["state"].time_ns) == 10_000_000)
+    *ticks, last = np.diff(log["state"].time_ns)
+    assert set(ticks) == {10_000_000}
+    assert 0 < last <= 10_000_000  # on a fast machine it reaches the ground, which ends it within a tick
     assert log["status"]["log_dropped"][-1] == 0
 
 

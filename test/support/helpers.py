@@ -224,8 +224,8 @@ def model_numbers(aircraft):
     """Arrays of numbers of the compiled model by the names of their fields."""
     found = {}
     for name, part in aircraft.model()._asdict().items():
-        if name == "places":
-            found |= {f"places.{field}": values for field, values in part._asdict().items()}
+        if name == "indices":
+            found |= {f"indices.{field}": values for field, values in part._asdict().items()}
         elif part.dtype.names:
             found |= {f"{name}.{field}": part[field] for field in part.dtype.names}
         else:

@@ -85,11 +85,11 @@ def write_rows(folder: Path, flown: list[list[bytes]], seconds: float) -> list[R
     log, channels = new_log(folder / "calls.mcap")
     prices = []
     for number in range(200):
-        begun = time.perf_counter()
+        start = time.perf_counter()
         for tick in flown[number % 990 : number % 990 + 10]:
             for channel, data in zip(channels, tick, strict=True):
                 log.write(channel, number, data)
-        prices.append((time.perf_counter() - begun) / 60)
+        prices.append((time.perf_counter() - start) / 60)
         time.sleep(0.01)
     log.close()
     high = statistics.quantiles(prices, n=20)[-1]
@@ -109,27 +109,27 @@ def write_rows(folder: Path, flown: list[list[bytes]], seconds: float) -> list[R
     rows.append(("log: 600 messages/s", (busy - idle) * 100, "%", note))
 
     log, channels = new_log(folder / "throughput.mcap")
-    count, size, begun = 50_000, 0, time.perf_counter()
+    count, size, start = 50_000, 0, time.perf_counter()
     for number in range(count):
         for channel, data in zip(channels, flown[number % len(flown)], strict=True):
             log.write(channel, number * NANOSECONDS, data, wait=True)
             size += len(data)
     log.close(60.0)
-    took = time.perf_counter() - begun
+    took = time.perf_counter() - start
     note = f"messages/s, {size / took / 1e6:.0f} MB/s, {log.dropped} dropped"
     return [*rows, ("log: throughput", count * len(TYPES) / took, "/s", note)]
 
 
 def cpu_of(act: Callable[[list[bytes], int], None], flown: list[list[bytes]], seconds: float) -> float:
     """Share of a core that this process takes while it acts at every tick in real time."""
-    begun, cpu = time.monotonic(), time.process_time()
+    start, cpu = time.monotonic(), time.process_time()
     number = 0
-    while (now := time.monotonic() - begun) < seconds:
+    while (now := time.monotonic() - start) < seconds:
         if number * TICK > now:
             time.sleep(number * TICK - now)
         act(flown[number % len(flown)], number)
         number += 1
-    return (time.process_time() - cpu) / (time.monotonic() - begun)
+    return (time.process_time() - cpu) / (time.monotonic() - start)
 
 
 def read_rows(folder: Path, flown: list[list[bytes]], ticks: int) -> list[Row]:
@@ -141,18 +141,18 @@ def read_rows(folder: Path, flown: list[list[bytes]], ticks: int) -> list[Row]:
             log.write(channel, number * NANOSECONDS, data, wait=True)
     log.close(60.0)
     size = path.stat().st_size / 1e6
-    begun = time.perf_counter()
+    start = time.perf_counter()
     found = read(path)
     scanned = time.perf_counter()
     for topic in found.values():
         len(topic)
     decoded = time.perf_counter()
-    note = f"{ticks * len(TYPES)} messages, {size:.0f} MB; {scanned - begun:.2f} s of it the file, the rest all fields"
-    rows: list[Row] = [(f"log: reading {ticks * TICK / 60:g} min", decoded - begun, "s", note)]
-    begun = time.perf_counter()
+    note = f"{ticks * len(TYPES)} messages, {size:.0f} MB; {scanned - start:.2f} s of it the file, the rest all fields"
+    rows: list[Row] = [(f"log: reading {ticks * TICK / 60:g} min", decoded - start, "s", note)]
+    start = time.perf_counter()
     recover(path, folder / "recovered.mcap")
     note = "read, written, read again"
-    return [*rows, (f"log: recovering {ticks * TICK / 60:g} min", time.perf_counter() - begun, "s", note)]
+    return [*rows, (f"log: recovering {ticks * TICK / 60:g} min", time.perf_counter() - start, "s", note)]
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ def integer(name: str, value: Any, minimum: int, maximum: int, error: Kind) -> i
     """An integer from `minimum` to `maximum`, ends included."""
     is_integer = isinstance(value, numbers.Integral) and not isinstance(value, bool)
     if not (is_integer and minimum <= value <= maximum):
-        raise error(f"{name} = {shown(value)}: allowed are whole numbers from {minimum} to {maximum}")
+        raise error(f"{name} = {shown(value)}: allowed are integers from {minimum} to {maximum}")
     return int(value)
 
 

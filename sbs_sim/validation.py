@@ -11,7 +11,7 @@ from sbs_sim import checks
 MAX_VALUES = 10_000  # of a file; nested aliases expand a few lines to billions of values
 TYPE_WORDS = {
     "number": "a number",
-    "integer": "a whole number",
+    "integer": "an integer",
     "string": "a text",
     "array": "a list",
     "object": "a mapping of keys to values",

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 BODY = ("u", "w", "q", "theta", "v", "p", "phi", "r")
 DEPARTURES = (1.0, 1.0, 1.0, 0.2, 1.0, 1.0, 0.2, 0.5, 1.0, 1.0, 1.0, 0.3)  # BODY, then ahead, right, down, heading
-LARGEST_GAP = 3.0  # m that it hurries for
+MAX_GAP = 3.0  # m that it hurries for
 
 
 class HoverLaw:
@@ -62,7 +62,7 @@ class HoverLaw:
             Body axes [m/s, rad/s].
         """
         heading, pitch, roll = euler
-        gap = np.clip(position - self._place, -LARGEST_GAP, LARGEST_GAP)
+        gap = np.clip(position - self._place, -MAX_GAP, MAX_GAP)
         c, s = math.cos(heading), math.sin(heading)
         ahead, right = c * gap[0] + s * gap[1], c * gap[1] - s * gap[0]
         u, v, w = velocity

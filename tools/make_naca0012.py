@@ -34,7 +34,7 @@ PAST_STALL_DEG = 1.0
 MODEL_SIZE = "xxxlarge"
 N_CRIT = 9.0
 TRANSITION = 0.1  # forced transition, fraction of chord, both sides
-LEAST_CONFIDENCE = 0.8
+MIN_CONFIDENCE = 0.8
 ASPECT_RATIO = 10.0  # blade radius over chord, 0.505 m / 0.051 m, rounded
 
 NEURALFOIL = f"NeuralFoil {version('neuralfoil')}"
@@ -77,7 +77,7 @@ def trusted_polar(reynolds: float, step_deg: float) -> tuple[Array, Array, Array
     join_deg = np.degrees(fine[np.argmax(evaluate(reynolds, fine)[0])]) + PAST_STALL_DEG
     alpha = np.arange(round(join_deg / step_deg) + 1) * np.radians(step_deg)
     cl, cd, confidence = evaluate(reynolds, alpha)
-    if confidence.min() < LEAST_CONFIDENCE:
+    if confidence.min() < MIN_CONFIDENCE:
         raise SystemExit(f"NeuralFoil's confidence falls to {confidence.min():.2f} at Re {reynolds:g}")
     cl[0] = 0.0
     return (

@@ -26,7 +26,7 @@ GUST_DELAY, AFTER_GUST = 1.0, 12.0  # s before a gust, and after it
 SETTLING = 10.0  # s, in which the integrals learn the steady wind; not in the figures
 MIN_TURBULENCE_AIRSPEED = 1.0  # m/s at which the frozen field passes where there is no wind
 PLACE = ("north", "east", "down")
-LONGEST = 3600.0  # s
+MAX_DURATION = 3600.0  # s
 
 
 def main() -> int:
@@ -89,8 +89,8 @@ def _work(arguments: argparse.Namespace) -> None:
 
     if not 0 <= arguments.delay <= MAX_DELAY:
         raise UsageError(f"--delay {arguments.delay}: allowed are 0 to {MAX_DELAY} ticks")
-    if not 1.0 <= arguments.duration <= LONGEST:
-        raise UsageError(f"--duration {arguments.duration:g}: allowed are 1 to {LONGEST:g} s")
+    if not 1.0 <= arguments.duration <= MAX_DURATION:
+        raise UsageError(f"--duration {arguments.duration:g}: allowed are 1 to {MAX_DURATION:g} s")
     check_target(arguments.json)
     airs = _airs(arguments)
     craft = aircraft(arguments)

@@ -141,7 +141,7 @@ def _values(arguments: argparse.Namespace) -> list[float]:
         raise UsageError("needed are START STOP COUNT, or --values")
     start, stop, count = arguments.range
     if not (1 <= count <= MAX_POINTS and count == int(count)):
-        raise UsageError(f"COUNT = {count:g}: allowed are whole numbers from 1 to {MAX_POINTS}")
+        raise UsageError(f"COUNT = {count:g}: allowed are integers from 1 to {MAX_POINTS}")
     steps = max(int(count) - 1, 1)
     return [start + (stop - start) * i / steps for i in range(int(count))]
 

@@ -109,7 +109,7 @@ def checked_workers(workers: int | None, dask: object, error: type[SbsError]) ->
     Raises
     ------
     error
-        It is no whole number in the range, or there is a cluster.
+        It is no integer in the range, or there is a cluster.
     """
     if workers is None:
         return len(os.sched_getaffinity(0))

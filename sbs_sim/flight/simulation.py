@@ -217,9 +217,9 @@ class Simulation:
         if abs(norm - 1.0) > UNIT:  # what has been normalised once stays as it is, bit for bit
             values[S.ATTITUDE : S.ATTITUDE + 4] = quaternion / norm
         values[self._held] = 0.0
-        deepest = np.zeros((1, 1))
-        lowest_point(self.model.rotors, values[:, np.newaxis], deepest)
-        lowest, ground = -float(deepest[0, 0]), -self.bounds[-1]
+        down = np.zeros((1, 1))
+        lowest_point(self.model.rotors, values[:, np.newaxis], down)
+        lowest, ground = -float(down[0, 0]), -self.bounds[-1]
         if lowest <= ground:
             raise SimulationError(
                 f"state position: the aircraft reaches down to {lowest:g} m: allowed is above {ground:g} m, the ground"

@@ -178,8 +178,8 @@ def test_a_flight_that_fails_ends_with_its_reason_and_disturbs_no_other(sbs, cas
         ({"duration": -1.0}, "duration = -1.0: allowed are 0 to 1e+06 s"),
         ({"duration": math.nan}, "duration = nan: allowed are 0 to 1e+06 s"),
         ({"tick": 0.0}, "tick = 0.0: allowed are 0.0001 to 1 s"),
-        ({"every": 0}, "every = 0: allowed are whole numbers from 1 to 10000000000"),
-        ({"workers": 0}, "workers = 0: allowed are whole numbers from 1 to 256"),
+        ({"every": 0}, "every = 0: allowed are integers from 1 to 10000000000"),
+        ({"workers": 0}, "workers = 0: allowed are integers from 1 to 256"),
         (
             {"speed": 1},
             "speed: unknown option, allowed are tick, azimuth_step, method, ground_altitude, actuators, lead_lag,"

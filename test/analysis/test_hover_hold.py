@@ -337,5 +337,5 @@ def test_the_first_controls_of_a_pilot_are_treated_like_all_others(sbs, model):
 
 
 def test_a_delay_out_of_range_is_refused(sbs, model, found):
-    with pytest.raises(PilotError, match="delay = -1: allowed are whole numbers from 0 to 100"):
+    with pytest.raises(PilotError, match="delay = -1: allowed are integers from 0 to 100"):
         simulate_with_pilot(sbs, model.trim, H.HoverHold(found).controls, 1.0, delay=-1)

@@ -431,7 +431,7 @@ def test_hash_is_that_of_the_physics(sbs, hover_model):
         ({"method": "exact"}, LinearizationError, "method = 'exact': allowed are averaged, paper"),
         ({"step_scale": 0.0}, LinearizationError, "step_scale = 0.0: allowed are 0.001 to 10"),
         ({"step_scale": math.nan}, LinearizationError, "step_scale = nan"),
-        ({"azimuth_count": -3}, TrimError, "azimuth_count = -3: allowed are whole numbers from 1 to 1000"),
+        ({"azimuth_count": -3}, TrimError, "azimuth_count = -3: allowed are integers from 1 to 1000"),
         ({"airspeed": math.nan}, TrimError, "airspeed = nan"),
         ({"airspeed": 80.0}, TrimError, "residual"),
     ],

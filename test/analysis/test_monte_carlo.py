@@ -69,8 +69,8 @@ def test_the_field_passes_with_the_airspeed_and_never_stands(sbs):
 @pytest.mark.parametrize(
     ("error", "options", "line"),
     [
-        (BatchError, {"flights": 0}, "flights = 0: allowed are whole numbers from 1 to 1000000"),
-        (BatchError, {"seed": -1}, "seed = -1: allowed are whole numbers from 0 to 18446744073709551615"),
+        (BatchError, {"flights": 0}, "flights = 0: allowed are integers from 1 to 1000000"),
+        (BatchError, {"seed": -1}, "seed = -1: allowed are integers from 0 to 18446744073709551615"),
         (BatchError, {"spread": {"body.mass": 2.0}}, "spread of body.mass = 2.0: allowed are 0 to 1"),
         (BatchError, {"spread": {"body.mass": "x"}}, "spread of body.mass = 'x': allowed are 0 to 1"),
         (BatchError, {"spread": {"rotors.hub": 0.1}}, "spread of rotors.hub: its value "),
@@ -159,5 +159,5 @@ def test_flights_of_which_none_begins_are_told_with_their_reasons(tmp_path):
 
 
 def test_the_command_tells_what_is_wrong_in_one_line():
-    assert failure("batch", "--flights", 0) == "flights = 0: allowed are whole numbers from 1 to 1000000"
+    assert failure("batch", "--flights", 0) == "flights = 0: allowed are integers from 1 to 1000000"
     assert failure("batch", "--workers", 2, "--dask", "x").startswith("workers = 2: not allowed with dask")

@@ -170,8 +170,8 @@ def test_a_sweep_of_failures_only(sbs):
         ("airspeed", [0.0, math.nan], {}, "values[1] = nan: allowed are finite numbers"),
         ("airspeed", [-math.inf], {}, "values[0] = -inf: allowed are finite numbers"),
         ("airspeed", ["fast"], {}, "values = ['fast']: allowed are numbers"),
-        ("airspeed", [0.0], {"workers": 0}, "workers = 0: allowed are whole numbers from 1 to 256"),
-        ("airspeed", [0.0], {"workers": 1.5}, "workers = 1.5: allowed are whole numbers from 1 to 256"),
+        ("airspeed", [0.0], {"workers": 0}, "workers = 0: allowed are integers from 1 to 256"),
+        ("airspeed", [0.0], {"workers": 1.5}, "workers = 1.5: allowed are integers from 1 to 256"),
         (
             "body.weight",
             [0.0],

@@ -401,7 +401,7 @@ def test_heave_damping_of_the_paper(sbs):
         ({"climb_rate": -math.inf}, "climb_rate = -inf: allowed are -50 to 50 m/s"),
         ({"sideslip": 4.0}, "sideslip = 4.0: allowed are -3.14159 to 3.14159 rad"),
         ({"turn_rate": 9.0}, "turn_rate = 9.0: allowed are -3 to 3 rad/s"),
-        ({"azimuth_count": 0}, "azimuth_count = 0: allowed are whole numbers from 1 to 1000"),
+        ({"azimuth_count": 0}, "azimuth_count = 0: allowed are integers from 1 to 1000"),
     ],
 )
 def test_absurd_condition_is_named_with_its_range(sbs, condition, message):

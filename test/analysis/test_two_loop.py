@@ -367,7 +367,7 @@ def test_unknown_method_is_refused(sbs, method):
 def test_number_of_azimuths_is_a_whole_number(sbs, count):
     with pytest.raises(TrimError) as error:
         trim(sbs, azimuth_count=count)
-    assert str(error.value) == f"azimuth_count = {count!r}: allowed are whole numbers from 1 to 1000"
+    assert str(error.value) == f"azimuth_count = {count!r}: allowed are integers from 1 to 1000"
 
 
 @pytest.mark.parametrize("method", ["newton", "two_loop"])

@@ -456,7 +456,7 @@ REFUSED = {
     ),
     "no blades": ((*R0, "blades"), 0, "rotors[0].blades = 0: allowed is >= 3"),
     "two blades": ((*R0, "blades"), 2, "rotors[0].blades = 2: allowed is >= 3"),
-    "three and a half blades": ((*R0, "blades"), 3.5, "rotors[0].blades = 3.5: allowed is a whole number"),
+    "three and a half blades": ((*R0, "blades"), 3.5, "rotors[0].blades = 3.5: allowed is an integer"),
     "blade whose mass is too far out": (
         (*R0, "blade_cg"),
         0.25,

@@ -282,11 +282,11 @@ FAILURES = {
         ("trim", "--guess-deg", "5", "0", "nan", "1"),
         "guess_deg: longitudinal_cyclic = nan: allowed are -90 to 90 deg",
     ),
-    "azimuths": (("trim", "--azimuth-count", "0"), "azimuth_count = 0: allowed are whole numbers from 1 to 1000"),
+    "azimuths": (("trim", "--azimuth-count", "0"), "azimuth_count = 0: allowed are integers from 1 to 1000"),
     "unknown parameter": (("sweep", "body.mas", "1", "2", "2"), "parameter 'body.mas': allowed are airspeed, "),
     "unknown limit": (("gusts", "--limit", "wings=1"), "limit 'wings': unknown, allowed are u, v, w, "),
     "no turbulence": (("gusts", "--turbulence", "-1"), "turbulence_intensity.x = -1.0: allowed are 0 to 100 m/s"),
-    "workers": (("sweep", "airspeed", "1", "2", "2", "--workers", "0"), "workers = 0: allowed are whole numbers "),
+    "workers": (("sweep", "airspeed", "1", "2", "2", "--workers", "0"), "workers = 0: allowed are integers "),
 }
 
 

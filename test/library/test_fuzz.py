@@ -92,7 +92,7 @@ WRONG_TYPES = {
     ),
     "flights beyond all bounds": (
         lambda ac: gust_cases(ac, 10**9, {}, turbulence=1.0),
-        "flights = 1000000000: allowed are whole numbers from 1 to 1000000",
+        "flights = 1000000000: allowed are integers from 1 to 1000000",
     ),
     "number for a pilot": (
         lambda ac: simulate_with_pilot(ac, None, 3, 0.1),

@@ -264,7 +264,7 @@ def test_step_is_refused_while_playing_and_for_bad_numbers(simulation):
         loop.pause(True)
         at = loop.call(lambda: simulation.step)
         for ticks in (0, -1, 10_001):
-            assert refusal(loop.step, ticks) == f"ticks = {ticks}: allowed are whole numbers from 1 to 1000"
+            assert refusal(loop.step, ticks) == f"ticks = {ticks}: allowed are integers from 1 to 1000"
         assert loop.call(lambda: simulation.step) == at
 
 

@@ -286,8 +286,8 @@ def test_wind_moves_the_aircraft_and_a_gust_passes(client):
         ),
         ("set_wind", SetWind, {"gust_duration": -1.0}, "gust_duration = -1.0"),
         ("set_wind", SetWind, {"turbulence_intensity": Vector3(z=-1.0)}, "turbulence_intensity.z = -1.0"),
-        ("step", Step, {"ticks": 1001}, "ticks = 1001: allowed are whole numbers from 1 to 1000"),
-        ("step", Step, {"ticks": 4294967295}, "ticks = 4294967295: allowed are whole numbers from 1 to"),
+        ("step", Step, {"ticks": 1001}, "ticks = 1001: allowed are integers from 1 to 1000"),
+        ("step", Step, {"ticks": 4294967295}, "ticks = 4294967295: allowed are integers from 1 to"),
     ],
 )
 def test_bad_requests_are_refused_and_change_nothing(client, name, kind, request_fields, said):

@@ -252,13 +252,13 @@ def test_turbulence_is_continuous_and_linear_within_a_tick():
         ("turbulence_length", 0.0, "turbulence_length = 0.0: allowed are 0.1 to 10000 m"),
         ("turbulence_airspeed", 0.0, "turbulence_airspeed = 0.0: allowed are 0.1 to 100 m/s"),
         ("turbulence_direction", 11.0, "turbulence_direction = 11.0: allowed are -10 to 10 rad"),
-        ("turbulence_seed", -1, "turbulence_seed = -1: allowed are whole numbers from 0 to 18446744073709551615"),
+        ("turbulence_seed", -1, "turbulence_seed = -1: allowed are integers from 0 to 18446744073709551615"),
         (
             "turbulence_seed",
             2**64,
-            f"turbulence_seed = {2**64}: allowed are whole numbers from 0 to 18446744073709551615",
+            f"turbulence_seed = {2**64}: allowed are integers from 0 to 18446744073709551615",
         ),
-        ("turbulence_seed", 1.5, "turbulence_seed = 1.5: allowed are whole numbers from 0 to 18446744073709551615"),
+        ("turbulence_seed", 1.5, "turbulence_seed = 1.5: allowed are integers from 0 to 18446744073709551615"),
     ],
 )
 def test_a_bad_value_is_refused_in_one_line(field, value, line):

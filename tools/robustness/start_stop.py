@@ -23,9 +23,9 @@ from ros_harness import DOMAINS, EXECUTABLES, Client, environment
 from sbs_msgs.msg import BodyState
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-LONGEST_FLIGHT = 1.0  # s from the beginning of the flight to the interruption
+MAX_FLIGHT_TIME = 1.0  # s from the beginning of the flight to the interruption
 STARTING = 0.3  # share of those that are interrupted while they start
-LONGEST_START = 4.0  # s from our first line to the interruption of those
+MAX_START_TIME = 4.0  # s from our first line to the interruption of those
 PATIENCE = 60.0  # s until our first line runs
 
 
@@ -66,13 +66,13 @@ def await_moment(chance: random.Random, domain: int, pair: list[Simulator]) -> N
     for simulator in pair:
         simulator.await_first_line()
     if chance.random() < STARTING:
-        time.sleep(chance.uniform(0.0, LONGEST_START))
+        time.sleep(chance.uniform(0.0, MAX_START_TIME))
         return
     client = Client(domain)
     states = client.watch(f"{chance.choice(pair).namespace}/state", BodyState)
     client.until(lambda: states, "a state")
     client.close()
-    time.sleep(chance.choice((0.0, 0.0, chance.uniform(0.0, LONGEST_FLIGHT))))
+    time.sleep(chance.choice((0.0, 0.0, chance.uniform(0.0, MAX_FLIGHT_TIME))))
 
 
 def interrupt(chance: random.Random, simulator: Simulator) -> None:

@@ -37,7 +37,7 @@ from sbs_sim.errors import TrimError  # noqa: E402
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint  # noqa: E402
 
 SOLVED = 1e-8  # largest scaled residual of a trim
-LARGEST_UNKNOWN = 1.3  # rad; bounds of the least squares
+MAX_UNKNOWN = 1.3  # rad; bounds of the least squares
 EVALUATIONS = 60
 # Velocity gained in a revolution of the slowest rotor, over what a free fall would gain: unstable modes, and vibration
 # that is not that of the mean, make up to 0.06 of it.
@@ -158,7 +158,7 @@ class Other:
                 self.residual,
                 self._random_start(),
                 jac=lambda unknowns: np.nan_to_num(self._problem.jacobian(self._condition, unknowns)),
-                bounds=(-LARGEST_UNKNOWN, LARGEST_UNKNOWN),
+                bounds=(-MAX_UNKNOWN, MAX_UNKNOWN),
                 max_nfev=EVALUATIONS,
                 **dict.fromkeys(("xtol", "ftol", "gtol"), 1e-14),
             )

@@ -26,6 +26,7 @@ SHUTDOWN_POLL_PERIOD = 0.2  # s, longest time that a thread takes to see the end
 INTERRUPTION_POLL_PERIOD = 0.1  # s between looks whether there was an interruption
 DISCOVERY_TIME = 1.5  # s in which others that run already are found
 SHUTDOWN_TIMEOUT = 3.0  # s that a thread may take to end
+MIDDLEWARE_TIMEOUT = 15.0  # s that ROS may take to end
 
 
 def run(
@@ -113,9 +114,14 @@ def _shut_down(nodes: list[Component], threads: list[threading.Thread]) -> None:
         node.finish()
     if any(thread.is_alive() for thread in threads):
         os._exit(0)  # a long computation cannot be interrupted
+    # Logs are closed: a middleware that does not let go must not keep the process.
+    let_go = threading.Timer(MIDDLEWARE_TIMEOUT, os._exit, (0,))
+    let_go.daemon = True
+    let_go.start()
     for node in reversed(nodes):
         node.destroy_node()
     rclpy.try_shutdown()
+    let_go.cancel()
     ignore_interruptions()  # a second one must not disturb the end of the interpreter
 
 

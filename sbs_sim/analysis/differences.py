@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.flight.engine import points_engine
 from sbs_sim.flight.trim_point import TrimPoint
-from sbs_sim.model import records as R
 from sbs_sim.model import state as S
-from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
 
 Array = NDArray[np.float64]
 
@@ -68,22 +66,8 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
     """
     engine = points_engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
     inputs = np.concatenate([point.state, point.controls])
-    outputs = len(point.state) + SPECIFIC_FORCE_SIZE + R.LOAD_SIZE * engine.rotors
     used = np.zeros(len(inputs), dtype=bool)
     used[used_states(point)] = used[len(point.state) :] = True
-    result = np.zeros((len(psi), len(inputs), outputs))
-    jacobian(
-        *(
-            engine.code.derivative,
-            engine.model,
-            inputs,
-            aircraft.mixing,
-            np.where(used, steps, 0.0),
-            np.append(aircraft.layout.linear_owners, np.full(len(S.CONTROL_NAMES), engine.rotors)),
-            psi,
-            engine.work,
-            engine.tick,
-        ),
-        *(engine.memory(len(inputs)), np.zeros((2, outputs)), np.zeros(engine.n, dtype=np.int64), result),
-    )
-    return result.transpose(0, 2, 1)
+    steps = np.where(used, steps, 0.0)
+    found = engine.jacobian(inputs, aircraft.mixing, steps, aircraft.layout.linear_owners, psi)
+    return found.transpose(0, 2, 1)

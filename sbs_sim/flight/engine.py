@@ -15,7 +15,7 @@ from sbs_sim.model.average import averaged_derivative
 from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.integrate import RK4, STAGES, advance
 from sbs_sim.model.kernel import address
-from sbs_sim.model.packing import lane_count
+from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
 from sbs_sim.model.wind import WIND_SIZE
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
 
@@ -88,19 +88,24 @@ class Engine:
 
     def __init__(self, model: R.Model, method: int = RK4, exponential: R.Exponential | None = None) -> None:
         self.model, self.work = model, R.make_work(model)
-        n, width = model.air["density"].shape[-1], lane_count()
-        none = R.make_exponential([], [[]] * n, width if n == 1 else n)
-        self.tick = R.make_tick(self.work, int(STAGES[method]), none if exponential is None else exponential)
+        if exponential is None:
+            n, width = self._arrangement
+            exponential = R.make_exponential([], [[]] * n, width)
+        self.tick = R.make_tick(self.work, int(STAGES[method]), exponential)
         self.size, self.n = self.tick.stage.shape
         self.rotors = len(self.tick.psi)
 
     @property
     def code(self) -> Code:
         """Machine code of this arrangement."""
-        arrangement = self.n, self.model.blades["rotor_speed"].shape[-1]
-        if arrangement not in _codes:
-            _codes[arrangement] = Code(self)
-        return _codes[arrangement]
+        if self._arrangement not in _codes:
+            _codes[self._arrangement] = Code(self)
+        return _codes[self._arrangement]
+
+    @property
+    def _arrangement(self) -> tuple[int, int]:
+        """Lanes of what belongs to a flight, and of what belongs to blades."""
+        return self.model.air["density"].shape[-1], self.model.blades["rotor_speed"].shape[-1]
 
     def average(self, x: Array, swashplate: Array, psi: Array) -> tuple[Array, Array]:
         """Mean over azimuths, shape (count, n_rotors) [rad], in still air.
@@ -117,6 +122,34 @@ class Engine:
             *(rates, loads),
         )
         return rates, loads.reshape(self.rotors, -1)
+
+    def jacobian(self, point: Array, mixing: Array, steps: Array, owners: NDArray[np.int64], psi: Array) -> Array:
+        """Central differences of the outputs of `sbs_sim.model.linear`, of a model that is arranged by "points".
+
+        Parameters
+        ----------
+        point, steps : ndarray, shape (m,)
+            Linear state and controls, and half the distance of each pair of evaluations; 0 leaves a column alone.
+        mixing : ndarray, shape (3 n_rotors, n_controls)
+            Swashplate angles = mixing @ controls.
+        owners : ndarray of int64, shape (linear_size,)
+            See `Layout.linear_owners`.
+        psi : ndarray, shape (n_azimuths, n_rotors)
+            [rad]
+
+        Returns
+        -------
+        ndarray, shape (n_azimuths, m, linear_size + 3 + 8 n_rotors)
+            Transposed; columns that were left alone are zero.
+        """
+        outputs = len(owners) + SPECIFIC_FORCE_SIZE + R.LOAD_SIZE * self.rotors
+        all_owners = np.append(owners, np.full(mixing.shape[1], self.rotors))
+        found = np.zeros((len(psi), len(point), outputs))
+        jacobian(
+            *(self.code.derivative, self.model, point, mixing, steps, all_owners, psi, self.work, self.tick),
+            *(self.memory(len(point)), np.zeros((2, outputs)), np.zeros(self.n, dtype=np.int64), found),
+        )
+        return found
 
     def memory(self, *shape: int) -> Array:
         """Zeros with a last axis for the lanes."""

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from sbs_sim.flight.engine import points_engine
 from sbs_sim.model import state as S
 from sbs_sim.model.exponential import coefficients
-from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
 from sbs_sim.model.packing import lane_count
-from sbs_sim.model.records import LOAD_SIZE, Exponential, make_exponential
+from sbs_sim.model.records import Exponential, make_exponential
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
@@ -94,14 +93,7 @@ def _rates_by_states(aircraft: "Aircraft", lead_lag: bool, cyclic_inflow: bool) 
         for part in (layout.flap_rate(j), layout.lag_rate(j)):
             steps[part.start - offset : part.stop - offset] = ANGLE_STEP * rotor.speed
         steps[layout.inflow(j).start - offset : layout.inflow(j).stop - offset] = INFLOW_STEP
-    outputs, angles = size + SPECIFIC_FORCE_SIZE + LOAD_SIZE * rotors, len(point) - size
-    found = np.zeros((1, len(point), outputs))
-    owners = np.append(layout.linear_owners, np.full(angles, rotors))
-    jacobian(
-        *(engine.code.derivative, engine.model, point, np.eye(angles), steps, owners, np.zeros((1, rotors))),
-        *(engine.work, engine.tick, engine.memory(len(point)), np.zeros((2, outputs))),
-        *(np.zeros(engine.n, dtype=np.int64), found),
-    )
+    found = engine.jacobian(point, np.eye(len(point) - size), steps, layout.linear_owners, np.zeros((1, rotors)))
     linear = np.zeros((layout.size, layout.size))
     first = S.LINEAR_BODY_SIZE
     linear[S.BODY_SIZE :, S.BODY_SIZE :] = found[0, first:size, first:size].T
@@ -118,7 +110,8 @@ def carrying(aircraft: "Aircraft", rotor: "Rotor") -> tuple[float, float]:
     """
     environment, tip_speed = aircraft.environment, rotor.speed * rotor.radius
     solidity = rotor.blades * 0.5 * (rotor.chord_root + rotor.chord_tip) / (math.pi * rotor.radius)
-    pressure = environment.air_density * math.pi * (rotor.radius * tip_speed) ** 2
+    scale = rotor.radius * tip_speed
+    pressure = environment.air_density * math.pi * (scale * scale)  # no power: libraries round it as they like
     share = aircraft.body.mass * environment.gravity / len(aircraft.rotors)
     thrust = min(share / pressure, MAX_LOADING * solidity) if pressure > 0.0 else 0.0
     inflow = math.sqrt(0.5 * thrust)

@@ -4,7 +4,7 @@ from sbs_sim.lanes import Vector, as_lanes, as_records, rounded, transposed
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import Quaternion, rotation
 from sbs_sim.model.kernel import entry, kernel
-from sbs_sim.model.linear import next_column, set_pairs
+from sbs_sim.model.linear import next_column, set_pairs, take_columns
 from sbs_sim.model.mixing import mix
 from sbs_sim.model.trigonometry import cosine_sine
 
@@ -93,11 +93,7 @@ def trim_sides(derivative, model, unknowns, steps, owners, motion, rotor_indices
             blades = model.rotors[owner]["blades"] if owner < rotors else 0
             column, first_pass = next_column(steps, owners, owner, 0), True
             while column < unknowns.size:
-                count = 0
-                while count < half // azimuths and column < unknowns.size:
-                    columns[count] = column
-                    count += 1
-                    column = next_column(steps, owners, owner, column + 1)
+                count, column = take_columns(steps, owners, owner, column, half // azimuths, columns)
                 set_pairs(unknowns, steps, psi, first, azimuths, columns, count, inputs, tick.psi)
                 set_flight(model, inputs, motion, rotor_indices, mixing, tick)
                 if owner < rotors and not first_pass:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.lanes import as_lanes
 from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.solve import product
 
 Array = NDArray[np.float64]
 
@@ -91,21 +92,14 @@ def coefficients(linear: Array, h: float) -> Array:
     b2, c3 = h * half[2], 2.0 * h * phi[2]  # of d_2 and d_3
     inner, new4 = h * (2.0 * phi[2] - 4.0 * phi[3]), h * (4.0 * phi[3] - phi[2])  # of d_2 and d_3, of d_4
     # f_1 + L (y_i - y_1) in terms of the derivatives: what is subtracted from f_2, f_3, f_4
-    b1 = a1 - _times(b2, half[0])
-    third1, third2 = one + _times(linear, b1), _times(linear, b2)
-    c1, c2 = first_order - _times(c3, third1), -_times(c3, third2)
-    fourth1, fourth2, fourth3 = one + _times(linear, c1), _times(linear, c2), _times(linear, c3)
-    new1 = first_order - _times(inner, half[0] + third1) - _times(new4, fourth1)
-    new2 = inner - _times(inner, third2) - _times(new4, fourth2)
-    new3 = inner - _times(new4, fourth3)
+    b1 = a1 - product(b2, half[0])
+    third1, third2 = one + product(linear, b1), product(linear, b2)
+    c1, c2 = first_order - product(c3, third1), -product(c3, third2)
+    fourth1, fourth2, fourth3 = one + product(linear, c1), product(linear, c2), product(linear, c3)
+    new1 = first_order - product(inner, half[0] + third1) - product(new4, fourth1)
+    new2 = inner - product(inner, third2) - product(new4, fourth2)
+    new3 = inner - product(new4, fourth3)
     return np.stack([a1, b1, b2, c1, c2, c3, new1, new2, new3, new4])
-
-
-def _times(left: Array, right: Array) -> Array:
-    """Product of two square matrices, to the same bits everywhere."""
-    product = np.zeros(left.shape)
-    multiply(left, right, product)
-    return product
 
 
 @entry
@@ -139,12 +133,6 @@ def set_phi_functions(z, doublings, phi, half):
                 phi[1, i, j] = 0.5 * (phi[1, i, j] + half[1, i, j])
                 phi[2, i, j] = 0.25 * (phi[2, i, j] + half[1, i, j] + half[2, i, j])
                 phi[3, i, j] = 0.125 * (phi[3, i, j] + 0.5 * half[1, i, j] + half[2, i, j] + half[3, i, j])
-
-
-@entry
-def multiply(left, right, out):
-    """Product of two square matrices."""
-    set_product(left, right, out)
 
 
 @kernel

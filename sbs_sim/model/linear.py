@@ -47,11 +47,7 @@ def jacobian(derivative, model, point, mixing, steps, owners, psi, work, tick, i
             blades = model.rotors[owner]["blades"] if owner < rotors else 0
             column, first_pass = next_column(steps, owners, owner, 0), True
             while column < point.size:
-                count = 0
-                while count < half // azimuths and column < point.size:
-                    columns[count] = column
-                    count += 1
-                    column = next_column(steps, owners, owner, column + 1)
+                count, column = take_columns(steps, owners, owner, column, half // azimuths, columns)
                 set_pairs(point, steps, psi, first, azimuths, columns, count, inputs, tick.psi)
                 if owner < rotors and not first_pass:
                     work.span[0], work.span[1] = begin, begin + blades
@@ -73,6 +69,17 @@ def next_column(steps, owners, owner, column):
     while column < steps.size and (steps[column] == 0.0 or owners[column] != owner):
         column += 1
     return column
+
+
+@kernel
+def take_columns(steps, owners, owner, column, most, columns):
+    """Set `columns` to those of an owner from `column` on, at most so many; their number, and the next column."""
+    count = 0
+    while count < most and column < steps.size:
+        columns[count] = column
+        count += 1
+        column = next_column(steps, owners, owner, column + 1)
+    return count, column
 
 
 @kernel

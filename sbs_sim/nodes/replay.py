@@ -16,7 +16,13 @@ from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.log_player import LogPlayer, Progress
 from sbs_sim.nodes.process import DISCOVERY_TIME, own_arguments, run
-from sbs_sim.nodes.signals import INTERRUPTED, ignore_interruptions, note_interruptions, when_interrupted
+from sbs_sim.nodes.signals import (
+    INTERRUPTED,
+    disregard_interruptions,
+    ignore_interruptions,
+    note_interruptions,
+    when_interrupted,
+)
 from sbs_sim.nodes.what_if import fly_with
 from sbs_sim.recording import Log, read, recover
 from sbs_sim.recording.playback import Playback
@@ -47,6 +53,7 @@ def main(args: list[str] | None = None) -> None:
             sys.exit(_fly_with(options))
         sys.exit(_replay(options))
     except KeyboardInterrupt:
+        ignore_interruptions()  # a second one must not disturb the end of the interpreter
         sys.exit(INTERRUPTED)
     except SbsError as error:
         print(" ".join(str(error).split()), file=sys.stderr)
@@ -55,7 +62,7 @@ def main(args: list[str] | None = None) -> None:
 
 def _interrupt(*_: Any) -> None:
     """End what is done, once: the end is not to be disturbed."""
-    ignore_interruptions()
+    disregard_interruptions()
     raise KeyboardInterrupt
 
 

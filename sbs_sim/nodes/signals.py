@@ -16,11 +16,19 @@ def when_interrupted(act: Callable[..., object]) -> None:
             signal.signal(number, act)
 
 
-def ignore_interruptions() -> None:
-    """Ignore interruptions from now on: the process is ending.
+def disregard_interruptions() -> None:
+    """Let interruptions do nothing from now on; for use in a handler.
 
-    Python prints an error for one that arrives while its handler is replaced, so they are blocked meanwhile: this lets
-    those that came before act.
+    Several may have arrived at once: those whose turn is next call what is set here. (SIG_IGN cannot be called: Python
+    prints an error instead.)
+    """
+    when_interrupted(lambda *_: None)
+
+
+def ignore_interruptions() -> None:
+    """Ignore interruptions from now on, also while the interpreter ends; not for use in a handler.
+
+    They are blocked while handlers are replaced: this lets those that came before act.
     """
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)

@@ -298,6 +298,28 @@ def test_who_does_not_heed_a_closed_terminal_is_left_alone():
     assert found.stdout == "True True\n"
 
 
+def test_interruptions_that_arrive_at_once_end_a_command_without_a_word():
+    """Blocked and let go together, as a busy machine delivers Ctrl-C and the closing of a terminal."""
+    code = """
+        import os, signal
+        from sbs_sim.nodes import replay
+        from sbs_sim.nodes.signals import ignore_interruptions, when_interrupted
+        both = (signal.SIGINT, signal.SIGTERM)
+        when_interrupted(replay._interrupt)
+        signal.pthread_sigmask(signal.SIG_BLOCK, both)
+        for number in both:
+            os.kill(os.getpid(), number)
+        try:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, both)
+        except KeyboardInterrupt:
+            ignore_interruptions()
+            print("interrupted once", signal.getsignal(signal.SIGTERM) == signal.SIG_IGN)
+    """
+    command = [sys.executable, "-c", textwrap.dedent(code)]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert (found.stdout, found.stderr) == ("interrupted once True\n", "")
+
+
 def test_an_interruption_in_a_long_computation_leaves_a_whole_log(tmp_path):
     with world(next(DOMAINS), tmp_path) as made:
         made.client.watch("status", SimulationStatus)

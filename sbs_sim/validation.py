@@ -101,6 +101,8 @@ def _explain(error: Any) -> str:
         "maxProperties": f"a mapping with at most {limit}",
         "maxItems": f"a list of at most {limit}",
         "minLength": "a text that is not empty",
+        "pattern": "a name of lower-case letters, digits and underscores that begins with a letter",
+        "maxLength": f"a name of at most {limit} characters",
     }.get(rule, error.message)
     return f"{path or 'file'} = {checks.shown(value)}: allowed is {allowed}"
 

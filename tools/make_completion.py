@@ -16,6 +16,7 @@ from typing import Any
 import update_reference as reference
 
 from sbs_sim.commands.sweep import TYPED
+from sbs_sim.model.state import CONTROL_NAMES
 
 ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / "config" / "completion.bash"
@@ -102,6 +103,8 @@ def paths(schema: dict[str, Any], path: str = "") -> Iterator[str]:
     if "properties" in schema:
         for key, part in schema["properties"].items():
             yield from paths(part, f"{path}.{key}".lstrip("."))
+    elif path == "controls":  # the names are the file's: those of the aircraft in the repository
+        yield from (f"{path}.{name}.range_deg" for name in CONTROL_NAMES)
     elif "properties" in schema.get("items", {}):
         yield from paths(schema["items"], path)
     elif path not in ("name", "description"):

@@ -377,7 +377,11 @@ def allowed(schema: Mapping[str, Any]) -> str:
     if kind == "string":
         return "text"
     if kind == "object":
+        if "properties" not in schema:
+            return f"by name: {allowed(schema['additionalProperties'])}"
         names, inner = list(schema["properties"]), next(iter(schema["properties"].values()))
+        if any(part != inner for part in schema["properties"].values()):
+            return "; ".join(f"`{name}` {allowed(part)}" for name, part in schema["properties"].items())
         many = "for each of " if len(names) > 1 else ""
         return f"{many}{', '.join(f'`{name}`' for name in names)}: {allowed(inner)}"
     if kind == "array":

@@ -6,20 +6,21 @@
 from __future__ import annotations  # `help` then shows types by their names
 
 import hashlib
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks, config_file, validation
 from sbs_sim.aircraft.airfoils import load_tables
 from sbs_sim.aircraft.consistency import consistency_problems
-from sbs_sim.aircraft.declaration import cached_by_class, declarations, schema_of, values_of
-from sbs_sim.aircraft.description import Array, Description, Rotor
+from sbs_sim.aircraft.declaration import cached_by_class, declarations, frozen, schema_of, values_of
+from sbs_sim.aircraft.description import Array, Description, Range, Rotor
 from sbs_sim.aircraft.model_records import model_of, with_fidelity
 from sbs_sim.aircraft.paths import Location, check_path, locations, mirrored, replaced, separate, value_at
 from sbs_sim.content import same
@@ -29,9 +30,10 @@ from sbs_sim.model.frames import ONE, hub_axes
 from sbs_sim.model.mixing import mixed
 from sbs_sim.model.packing import by_blades, lane_count, side_by_side
 from sbs_sim.model.records import Model
-from sbs_sim.model.state import StateLayout
+from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, StateLayout
 
 MAX_CHANGES_SHOWN = 5  # in a refusal
+TYPICAL_ANGLE = 0.3  # rad; the range of a control that is no angle counts as that in trims
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +46,8 @@ class Aircraft(Description):
     environment : Environment
     body : Body
     options : Options
-    control_ranges : dict of str to (float, float)
-        Range of each pilot control [rad].
+    controls : tuple of Control
+        Pilot controls: those of the paper's aircraft in its order, then others in that of the file.
     rotors : tuple of Rotor
     tables : tuple of AirfoilTable
         Section data of each rotor's blades; one object for rotors that have the same.
@@ -198,7 +200,11 @@ class Aircraft(Description):
             for name, declaration in declarations(type(part)).items():
                 value = getattr(part, name)
                 if declaration.is_physics and not same(value, declaration.internal_default):
-                    _digest(digest, name, value)
+                    _digest(digest, name, self._factors(value) if name == "mixing" else value)
+        if self.control_names != CONTROL_NAMES or any(c.held is not None or not c.is_angle for c in self.controls):
+            for control in self.controls:
+                held = math.nan if control.held is None else control.held
+                _digest(digest, f"control {control.name} {control.unit}", held)
         for table in self.tables:
             for name in ("reynolds", "alpha", "cl", "cd"):
                 _digest(digest, name, getattr(table, name))
@@ -221,19 +227,109 @@ class Aircraft(Description):
         return data, contents
 
     def mix(self, controls: ArrayLike) -> Array:
-        """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls [rad], shape (4,)."""
+        """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls, shape (n_controls,)."""
         angles = np.empty((3 * len(self.rotors), 1))
-        mixed(self.mixing, np.asarray(controls, dtype=float).reshape(-1, 1), ONE, angles)
+        mixed(self.rigging, np.asarray(controls, dtype=float).reshape(-1, 1), ONE, angles)
         return angles.reshape(-1, 3)
 
     @cached_property
     def mixing(self) -> Array:
-        """Swashplate angles of all rotors over the pilot controls, shape (3 n_rotors, 4)."""
-        return np.concatenate([rotor.mixing for rotor in self.rotors])
+        """Swashplate angles of all rotors over the pilot controls, shape (3 n_rotors, n_controls)."""
+        return frozen(np.concatenate([self._factors(rotor.mixing) for rotor in self.rotors]))
+
+    def _factors(self, mixing: Mapping[str, Mapping[str, float]]) -> Array:
+        """Factors of one rotor, shape (3, n_controls)."""
+        return np.array([[row.get(name, 0.0) for name in self.control_names] for row in mixing.values()])
+
+    @cached_property
+    def rigging(self) -> Array:
+        """`mixing`, and as its last column the swashplate angles where all controls are zero [rad]."""
+        offsets = np.concatenate([rotor.swashplate_offset for rotor in self.rotors])
+        return frozen(np.column_stack([self.mixing, offsets]))
+
+    @cached_property
+    def control_names(self) -> tuple[str, ...]:
+        """Names of the pilot controls."""
+        return tuple(control.name for control in self.controls)
+
+    @property
+    def control_units(self) -> tuple[str, ...]:
+        """Units of the pilot controls: "rad" for angles."""
+        return tuple(control.unit for control in self.controls)
+
+    @property
+    def control_ranges(self) -> dict[str, Range]:
+        """Range of each pilot control [rad, or its unit]."""
+        return {control.name: control.range for control in self.controls}
+
+    @cached_property
+    def trimmed_controls(self) -> NDArray[np.int64]:
+        """Indices of the pilot controls that a trim finds."""
+        return np.array([i for i, control in enumerate(self.controls) if control.held is None], dtype=np.int64)
+
+    @cached_property
+    def axis_controls(self) -> NDArray[np.int64]:
+        """Indices of the pilot controls that heave, roll, pitch and yaw an aircraft, shape (4,).
+
+        Raises
+        ------
+        AircraftError
+            No control has one of these axes.
+        """
+        return axis_controls(tuple(control.axis for control in self.controls), self.control_units)
+
+    @cached_property
+    def has_axes(self) -> bool:
+        """It has controls for sticks and controllers, see `axis_controls`."""
+        try:
+            return len(self.axis_controls) == len(CONTROL_AXES)
+        except AircraftError:
+            return False
+
+    def with_axes(self, values: ArrayLike) -> Array:
+        """All pilot controls, shape (n_controls,), of those of the four axes; the others are held.
+
+        Raises
+        ------
+        AircraftError
+            See `axis_controls`.
+        """
+        controls = self.held_controls.copy()
+        controls[self.axis_controls] = values
+        return controls
+
+    @cached_property
+    def held_controls(self) -> Array:
+        """Values of the pilot controls that trims do not change, 0 for the others, shape (n_controls,)."""
+        return frozen([control.held or 0.0 for control in self.controls])
+
+    @cached_property
+    def trim_scales(self) -> Array:
+        """Change that counts as a radian of each control that a trim finds: 1 rad, of others some ranges."""
+        controls = [self.controls[i] for i in self.trimmed_controls]
+        return frozen([1.0 if c.is_angle else max(map(abs, c.range)) / TYPICAL_ANGLE or 1.0 for c in controls])
+
+    @cached_property
+    def trim_rigging(self) -> Array:
+        """`rigging` over the unknown controls of a trim; what the others are held at is in the last column."""
+        constant = self.rigging[:, -1] + self.mixing @ self.held_controls
+        return frozen(np.column_stack([self.mixing[:, self.trimmed_controls] * self.trim_scales, constant]))
+
+    def trim_unknowns(self, controls: Array) -> Array:
+        """Those of the pilot controls, shape (n_controls,), that a trim finds, over `trim_scales`."""
+        return np.asarray(controls[self.trimmed_controls] / self.trim_scales)
+
+    def with_held(self, unknowns: Array) -> Array:
+        """All pilot controls, shape (n_controls,), of `trim_unknowns`."""
+        controls = self.held_controls.copy()
+        controls[self.trimmed_controls] = unknowns * self.trim_scales
+        return controls
 
     def unmix(self, angles: Array) -> Array:
-        """Pilot controls [rad], shape (4,), whose mixture is nearest to swashplate angles [rad], (n_rotors, 3)."""
-        return np.asarray(np.linalg.lstsq(self.mixing, np.ravel(angles), rcond=None)[0], dtype=np.float64)
+        """Pilot controls, shape (n_controls,), whose mixture is nearest to swashplate angles [rad], (n_rotors, 3)."""
+        change = np.ravel(angles) - self.trim_rigging[:, -1]
+        found = np.linalg.lstsq(self.trim_rigging[:, :-1], change, rcond=None)[0]
+        return self.with_held(np.asarray(found, dtype=np.float64))
 
     def fuselage(self) -> tuple[float, Array, Array]:
         """Mass [kg], first moment [kg m] and inertia [kg m^2] about the c.g. of the aircraft without blades.
@@ -300,6 +396,23 @@ class Aircraft(Description):
                 for table in self.tables
             ]
         )
+
+
+def axis_controls(axes: Sequence[str], units: Sequence[str]) -> NDArray[np.int64]:
+    """Indices of the controls that heave, roll, pitch and yaw, of the axes and units of all.
+
+    Raises
+    ------
+    AircraftError
+        No control has one of these axes, or it is no angle.
+    """
+    for axis in CONTROL_AXES:
+        if axis not in axes:
+            needed = ", ".join(CONTROL_AXES)
+            raise AircraftError(f"controls: no control has axis = {axis}: sticks and controllers need {needed}")
+        if units[axes.index(axis)] != "rad":
+            raise AircraftError(f"controls: axis = {axis}: sticks and controllers need an angle, with range_deg")
+    return np.array([axes.index(axis) for axis in CONTROL_AXES], dtype=np.int64)
 
 
 @cached_by_class

@@ -5,10 +5,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sbs_sim.aircraft.description import Array, Range, Rotor
+from sbs_sim.aircraft.description import TRIMMED_CONTROLS, Array, Range, Rotor
+from sbs_sim.model.state import CONTROL_NAMES, EULER_NAMES, SWASHPLATE_NAMES
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
+
+
+# Names of what trims, flights and sweeps give beside states and controls.
+RESERVED_NAMES = frozenset(
+    {*EULER_NAMES, *SWASHPLATE_NAMES, "time", "thrust", "torque", "power", "state", "controls", "swashplate", "pitch"}
+    | {"roll", "heading", "airspeed", "climb_rate", "turn_rate", "residual", "acceleration", "warnings"}
+) - {*CONTROL_NAMES}
 
 
 def consistency_problems(aircraft: "Aircraft") -> list[str]:
@@ -19,8 +27,7 @@ def consistency_problems(aircraft: "Aircraft") -> list[str]:
         for key, value in (("hub_moment", options.hub_moment), ("flap_inertia", options.flap_inertia)):
             if value in ("paper", "axis_to_tip"):
                 problems.append(f"options.{key} = {value!r}: allowed with options.coupling = paper only")
-    for name, limits in aircraft.control_ranges.items():
-        problems += _range_problems(f"controls.{name}.range_deg", limits)
+    problems += _control_problems(aircraft)
     for i, rotor in enumerate(aircraft.rotors):
         problems += [f"rotors[{i}].{problem}" for problem in _rotor_problems(rotor)]
     names = [rotor.name for rotor in aircraft.rotors]
@@ -47,6 +54,41 @@ def _inertia_problems(path: str, inertia: Array) -> list[str]:
     if moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
         return [f"{path} = {shown}: allowed are principal moments of which none exceeds the sum of the others"]
     return []
+
+
+def _control_problems(aircraft: "Aircraft") -> list[str]:
+    """Of the pilot controls, and of the names in the mixing."""
+    problems = []
+    for control in aircraft.controls:
+        given, path = aircraft.data["controls"][control.name], f"controls.{control.name}"
+        if len({"range_deg", "range"} & given.keys()) != 1:
+            problems.append(f"{path}: allowed is range_deg for an angle, or range with unit for any other control")
+            continue
+        end = "_deg" if control.is_angle else ""
+        wrong = {"held", "unit"} if control.is_angle else {"held_deg"}
+        problems += [f"{path}.{key}: not allowed with range{end}" for key in sorted(wrong & given.keys())]
+        if not control.is_angle and (not control.unit.isprintable() or control.unit in ("", "rad", "deg")):
+            problems.append(f"{path}.unit = {control.unit!r}: allowed is the unit of a control that is no angle")
+        low, high = (round(control.shown(value), 9) for value in control.range)
+        if low > high:
+            problems.append(f"{path}.range{end} = [{low:g}, {high:g}]: allowed is a lower end below the upper one")
+        if control.held is not None and not control.range[0] <= control.held <= control.range[1]:
+            problems.append(f"{path}.held{end} = {given[f'held{end}']:g}: allowed are {low:g} to {high:g}")
+        if control.name in RESERVED_NAMES or aircraft.layout.has_name(control.name):
+            problems.append(f"{path}: allowed is a name that no state or output has")
+    found = [control.name for control in aircraft.controls if control.held is None]
+    if len(found) != TRIMMED_CONTROLS:
+        words = ", ".join(found) or "none"
+        problems.append(f"controls: allowed are {TRIMMED_CONTROLS} that trims find, without held; there are {words}")
+    axes = [control.axis for control in aircraft.controls if control.axis]
+    problems += [f"controls: axis = {axis}: used twice" for axis in sorted({a for a in axes if axes.count(a) > 1})]
+    names = [control.name for control in aircraft.controls]
+    for i, rotor in enumerate(aircraft.rotors):
+        for angle, factors in rotor.mixing.items():
+            unknown = [name for name in factors if name not in names]
+            where = ", ".join(f"rotors[{i}].mixing.{angle}.{name}" for name in unknown)
+            problems += [f"{where}: unknown key, allowed are {', '.join(names)}"] if unknown else []
+    return problems
 
 
 def _range_problems(path: str, limits: Range) -> list[str]:

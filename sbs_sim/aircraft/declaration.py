@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 METADATA_KEY = "declaration"
+NAME_PATTERN, MAX_NAME_LENGTH = "^[a-z][a-z0-9_]*$", 64  # of what a file names
 REQUIRED = object()  # instead of a default
 # From the unit of the file to radians, and the end that this unit gives to the key.
 CONVERSIONS: dict[str, tuple[str, str, Callable[[float], float]]] = {
@@ -205,6 +206,12 @@ def list_schema(items: Mapping[str, Any], minimum: int, maximum: int) -> dict[st
 def mapping_schema(properties: Mapping[str, Any], required: list[str]) -> dict[str, Any]:
     """JSON schema of a mapping with known keys."""
     return {"type": "object", "properties": properties, "required": sorted(required), "additionalProperties": False}
+
+
+def named_schema(values: Mapping[str, Any], **more: Any) -> dict[str, Any]:
+    """JSON schema of a mapping with names of the file's own as keys."""
+    names = {"pattern": NAME_PATTERN, "maxLength": MAX_NAME_LENGTH}
+    return {"type": "object", "propertyNames": names, "additionalProperties": values, **more}
 
 
 # -- what follows from the declarations ----------------------------------------------------------------

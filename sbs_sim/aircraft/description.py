@@ -5,6 +5,7 @@ file. The attributes are in SI units and radians; docs/reference/aircraft.md lis
 `sbs_sim.aircraft.declaration`.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,9 +19,9 @@ from sbs_sim.aircraft.declaration import (
     frozen,
     integer,
     interval,
-    interval_reader,
     list_schema,
     mapping_schema,
+    named_schema,
     number,
     number_schema,
     part,
@@ -28,12 +29,14 @@ from sbs_sim.aircraft.declaration import (
     string,
 )
 from sbs_sim.content import ByContent
-from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
+from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, SWASHPLATE_NAMES
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
 
-MAX_ROTORS = 16
+MAX_ROTORS, MAX_CONTROLS = 16, 16
+MAX_CONTROL = 1e6  # of a control that is no angle, in its unit
+TRIMMED_CONTROLS = 4  # that a trim finds
 
 
 @dataclass(frozen=True)
@@ -102,14 +105,28 @@ class Options:
 
 def _mixing() -> Any:
     """Field with the swashplate angles over the pilot controls, each factor under the names of both in the file."""
-    row = mapping_schema({control: number_schema(-10, 10) for control in CONTROL_NAMES}, [])
+    row = named_schema(number_schema(-10, 10))
     schema = mapping_schema(dict.fromkeys(SWASHPLATE_NAMES, row), list(SWASHPLATE_NAMES))
 
-    def matrix(rows: dict[str, dict[str, float]]) -> Array:
-        return frozen([[rows[angle].get(control, 0.0) for control in CONTROL_NAMES] for angle in SWASHPLATE_NAMES])
+    def factors(rows: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+        return {angle: {name: float(factor) for name, factor in rows[angle].items()} for angle in SWASHPLATE_NAMES}
 
-    text = "Swashplate angles over the pilot controls: angle = sum of factor x control; factors left out are 0"
-    return declared(text, schema, matrix, unit="rad/rad")
+    text = (
+        "Swashplate angles over the pilot controls: angle = sum of factor x control, in rad per rad, or per unit of a"
+        " control that is no angle; factors left out are 0"
+    )
+    return declared(text, schema, factors, unit="rad/rad")
+
+
+def _offsets() -> Any:
+    """Field with the swashplate angles where all pilot controls are zero."""
+    schema = mapping_schema({angle: number_schema(-90, 90) for angle in SWASHPLATE_NAMES}, [])
+
+    def angles(values: dict[str, float]) -> Array:
+        return frozen([math.radians(values.get(angle, 0.0)) for angle in SWASHPLATE_NAMES])
+
+    text = "Swashplate angles where all pilot controls are zero; those left out are 0"
+    return declared(text, schema, angles, unit="deg", default={})
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +134,8 @@ class Rotor(ByContent):
     """One rotor.
 
     `rotation` is +1 counter-clockwise seen from above (against the thrust); `hub` and `shaft_direction` have the shape
-    (3,), `mixing` has the shape (3, 4): swashplate angles (collective, lateral, longitudinal cyclic) = mixing @ pilot
-    controls.
+    (3,), `swashplate_offset` has the shape (3,) for collective, lateral and longitudinal cyclic; `mixing` holds the
+    factors of each of them by the names of the pilot controls, see `Aircraft.mixing`.
     """
 
     name: str = string("Name of the rotor", is_physics=False)
@@ -184,7 +201,8 @@ class Rotor(ByContent):
     swashplate_rate: float = number(
         "Fastest motion of each angle of the swashplate", 0, 1e6, "deg/s", above_minimum=True, is_physics=False
     )
-    mixing: Array = _mixing()
+    mixing: dict[str, dict[str, float]] = _mixing()
+    swashplate_offset: Array = _offsets()
 
     @property
     def blade_length(self) -> float:
@@ -224,16 +242,86 @@ class Rotor(ByContent):
         return np.stack([span, chord, chord * width / 2, lift, twist])
 
 
-def _control_ranges() -> Any:
-    """Field with the range of each pilot control by its name."""
-    control = mapping_schema({"range_deg": list_schema(number_schema(-90, 90), 2, 2)}, ["range_deg"])
-    schema = mapping_schema(dict.fromkeys(CONTROL_NAMES, control), list(CONTROL_NAMES))
-    ends = interval_reader("deg")
+@dataclass(frozen=True)
+class Control:
+    """A pilot control.
 
-    def ranges(controls: dict[str, dict[str, list[float]]]) -> dict[str, Range]:
-        return {name: ends(controls[name]["range_deg"]) for name in CONTROL_NAMES}
+    Attributes
+    ----------
+    name : str
+    range : (float, float)
+        [rad], or in its own unit if it is no angle.
+    unit : str
+        "rad" for an angle, else as in the file.
+    axis : str
+        Of `CONTROL_AXES`: what a pilot moves the aircraft about or along with it; empty if no stick is connected to it.
+    held : float or None
+        Value that it keeps in trims and where nothing commands it; None for a control that a trim finds.
+    """
 
-    return declared("Range of each pilot control", schema, ranges, unit="deg", key="controls")
+    name: str
+    range: Range
+    unit: str
+    axis: str
+    held: float | None
+
+    @property
+    def is_angle(self) -> bool:
+        """It is in radians."""
+        return self.unit == "rad"
+
+    @property
+    def shown_unit(self) -> str:
+        """Unit in which a person reads it: "deg" for an angle."""
+        return "deg" if self.is_angle else self.unit
+
+    @property
+    def limit(self) -> float:
+        """No command may be larger: a right angle [rad], or `MAX_CONTROL`."""
+        return math.pi / 2 if self.is_angle else MAX_CONTROL
+
+    def shown(self, value: float) -> float:
+        """Value in `shown_unit`."""
+        return math.degrees(value) if self.is_angle else value
+
+
+def _controls() -> Any:
+    """Field with the pilot controls by their names."""
+    angle, plain = number_schema(-90, 90), number_schema(-MAX_CONTROL, MAX_CONTROL)
+    keys = {
+        "range_deg": list_schema(angle, 2, 2),
+        "range": list_schema(plain, 2, 2),
+        "unit": {"type": "string", "minLength": 1},
+        "axis": {"enum": [*CONTROL_AXES, "none"]},
+        "held_deg": angle,
+        "held": plain,
+    }
+    schema = named_schema(mapping_schema(keys, []), maxProperties=MAX_CONTROLS)
+
+    def controls(values: dict[str, dict[str, Any]]) -> tuple[Control, ...]:
+        names = [*(name for name in CONTROL_NAMES if name in values), *(n for n in values if n not in CONTROL_NAMES)]
+        return tuple(_control(name, values[name]) for name in names)
+
+    text = (
+        "Pilot controls by name: range_deg of an angle, else range and its unit; axis that a pilot moves with it"
+        " (heave, roll, pitch, yaw, none); held_deg or held of a control that trims do not change"
+    )
+    return declared(text, schema, controls)
+
+
+def _control(name: str, values: dict[str, Any]) -> Control:
+    axis = values.get("axis", dict(zip(CONTROL_NAMES, CONTROL_AXES, strict=True)).get(name, "none"))
+    is_angle = "range_deg" in values
+    convert = math.radians if is_angle else float
+    low, high = values["range_deg" if is_angle else "range"] if is_angle or "range" in values else (0.0, 0.0)
+    held = values.get("held_deg" if is_angle else "held")
+    return Control(
+        name=name,
+        range=(convert(low), convert(high)),
+        unit="rad" if is_angle else values.get("unit", ""),
+        axis="" if axis == "none" else axis,
+        held=None if held is None else convert(held),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,5 +333,5 @@ class Description(ByContent):
     environment: Environment = part("Air and gravity", Environment)
     body: Body = part("The whole aircraft, blades included", Body)
     options: Options = part("How the model reads the equations", Options)
-    control_ranges: dict[str, Range] = _control_ranges()
+    controls: tuple[Control, ...] = _controls()
     rotors: tuple[Rotor, ...] = parts(f"The rotors, 1 to {MAX_ROTORS} of them", Rotor, 1, MAX_ROTORS)

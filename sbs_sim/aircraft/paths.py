@@ -56,6 +56,9 @@ def _walk(node: Any, schema: Mapping[str, Any], steps: Sequence[str | int], done
             raise _unknown(done, step, "unknown key, ", ", ".join(schema["properties"]))
         inner = _walk((node or {}).get(step), schema["properties"][step], rest, _joined(done, step))
         return [(step, *location) for location in inner]
+    if isinstance(named := schema.get("additionalProperties"), Mapping):  # names of the file's own
+        inner = _walk((node or {}).get(step), named, rest, _joined(done, step))
+        return [(step, *location) for location in inner]
     if "items" not in schema:
         raise AircraftError(f"{_joined(done, step)}: {done} is a single value")
     if node is None:
@@ -135,6 +138,8 @@ def unit_of(path: str, record: type = Description) -> str:
     """
     keys = tuple(step["key"] for step in STEP.finditer(path) if step["key"])
     known = units(record)
+    if keys[:1] == ("controls",) and keys[-1].endswith("_deg"):
+        return "deg"
     for chosen in (keys, keys[:1] + keys[2:]):  # the second key may be the name of a rotor
         for count in range(len(chosen), 0, -1):
             if chosen[:count] in known:

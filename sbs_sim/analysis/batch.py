@@ -173,10 +173,10 @@ def simulate_batch(
         Ticks from one row of the histories to the next: n_rows = n_ticks // every + 1. The rows are every so many of
         those of `sbs_sim.simulate`.
     outputs : sequence of str
-        What to keep of "state" (n_flights, n_rows, n_states), "controls" (..., 4), "swashplate" (..., n_rotors, 3),
-        "acceleration" (..., 3), "thrust", "torque", "power" (..., n_rotors), and of single states by their names
-        (n_flights, n_rows). The four loads and accelerations take a derivative for every row. Aircraft with fewer
-        rotors or other states have NaN in their places.
+        What to keep of "state" (n_flights, n_rows, n_states), "controls" (..., n_controls), "swashplate"
+        (..., n_rotors, 3), "acceleration" (..., 3), "thrust", "torque", "power" (..., n_rotors), and of single states
+        by their names (n_flights, n_rows). The four loads and accelerations take a derivative for every row. Aircraft
+        with fewer rotors or other states have NaN in their places.
     tick, **options
         See `sbs_sim.simulate`: azimuth_step, lead_lag, cyclic_inflow, method, ground_altitude, actuators.
     workers : int, optional
@@ -267,7 +267,7 @@ def _memory(
     rotors = max(len(case.aircraft.rotors) for case in cases)
     sizes = {
         "state": (len(names),),
-        "controls": (len(S.CONTROL_NAMES),),
+        "controls": (max(len(case.aircraft.controls) for case in cases),),
         "swashplate": (rotors, 3),
         "acceleration": (3,),
         **dict.fromkeys(("thrust", "torque", "power"), (rotors,)),

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.model.state import CONTROL_NAMES
+from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES
 
 Array = NDArray[np.float64]
 
 NEGLIGIBLE = 0.02  # of the largest effect of a control on an axis
-STICKS = {  # state that each control is expected to move, and which way more of its stick does: up, right, down, left
-    "collective": ("w", -1.0),
-    "lateral_cyclic": ("p", 1.0),
-    "longitudinal_cyclic": ("q", -1.0),
-    "differential_longitudinal_cyclic": ("r", -1.0),
+STICKS = {  # state that a pilot moves with a control of each axis, and the sense of more stick: up, right, down, left
+    "heave": ("w", -1.0),
+    "roll": ("p", 1.0),
+    "pitch": ("q", -1.0),
+    "yaw": ("r", -1.0),
 }
 AXES = {  # of a state: what it is called, and what positive and negative accelerations do
     "u": ("surge", "forward", "backward"),
@@ -43,7 +43,7 @@ class ControlEffect:
     axis : str
         "heave", "roll", "pitch" or "yaw", whichever is expected of it; another one only if it hardly moves that.
     acceleration : float
-        Along that axis, in body axes [m/s^2 or rad/s^2 per rad of the control].
+        Along that axis, in body axes [m/s^2 or rad/s^2 per rad of the control, or per unit of one that is no angle].
     sense : float
         1 where more of the control is what more of its stick is to do: up, roll to the right, nose down, nose left;
         else -1.
@@ -59,7 +59,10 @@ class ControlEffect:
 
 
 def control_effects(
-    b: Array, state_names: Sequence[str], control_names: Sequence[str] = CONTROL_NAMES
+    b: Array,
+    state_names: Sequence[str],
+    control_names: Sequence[str] = CONTROL_NAMES,
+    control_axes: Sequence[str] = CONTROL_AXES,
 ) -> tuple[ControlEffect, ...]:
     """Effects of all controls.
 
@@ -70,6 +73,8 @@ def control_effects(
     state_names : sequence of str, length n
         With u, v, w, p, q, r.
     control_names : sequence of str, length m
+    control_axes : sequence of str, length m
+        Axis that a pilot expects each to move, or an empty text.
 
     Returns
     -------
@@ -78,15 +83,15 @@ def control_effects(
     rows = {name: b[state_names.index(name)] for name in AXES}
     largest = {name: float(np.abs(row).max()) for name, row in rows.items()}
     return tuple(
-        _effect(name, {axis: float(row[i]) for axis, row in rows.items()}, largest)
-        for i, name in enumerate(control_names)
+        _effect(name, expected, {axis: float(row[i]) for axis, row in rows.items()}, largest)
+        for i, (name, expected) in enumerate(zip(control_names, control_axes, strict=True))
     )
 
 
-def _effect(control: str, found: dict[str, float], largest: dict[str, float]) -> ControlEffect:
+def _effect(control: str, expected: str, found: dict[str, float], largest: dict[str, float]) -> ControlEffect:
     """Effect of one control that gives these accelerations, of which these are the largest of all controls."""
-    axis, wanted = STICKS[control]
-    if abs(found[axis]) <= NEGLIGIBLE * largest[axis]:
+    axis, wanted = STICKS.get(expected, ("w", -1.0))
+    if not expected or abs(found[axis]) <= NEGLIGIBLE * largest[axis]:
         shares = {name: abs(value) / largest[name] for name, value in found.items() if value}
         axis = max(shares, key=lambda name: shares[name], default=axis)
         wanted = math.copysign(1.0, found[axis])  # nobody expects anything of it

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.description import Control
 from sbs_sim.flight.engine import points_engine
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.model import state as S
@@ -22,9 +23,15 @@ BODY_STEPS = {
 
 
 def difference_steps(aircraft: Aircraft, scale: float = 1.0) -> Array:
-    """Steps of the central differences for all linear states and the controls, shape (linear_size + 4,)."""
+    """Steps of the central differences for all linear states and the controls, shape (linear_size + n_controls,)."""
     steps = [_state_step(name) for name in aircraft.layout.linear_names]
-    return scale * np.array(steps + [CONTROL_STEP] * len(S.CONTROL_NAMES))
+    return scale * np.array(steps + [CONTROL_STEP * _size(control) for control in aircraft.controls])
+
+
+def _size(control: Control) -> float:
+    """What a step of a control is measured by: 1 rad, or the range of a control that is no angle."""
+    low, high = control.range
+    return 1.0 if control.is_angle else (high - low) or 1.0
 
 
 def _state_step(name: str) -> float:
@@ -57,11 +64,11 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
     point : TrimPoint
     psi : ndarray, shape (n_azimuths, n_rotors)
         [rad]
-    steps : ndarray, shape (linear_size + 4,)
+    steps : ndarray, shape (linear_size + n_controls,)
 
     Returns
     -------
-    ndarray, shape (n_azimuths, linear_size + 3 + 8 n_rotors, linear_size + 4)
+    ndarray, shape (n_azimuths, linear_size + 3 + 8 n_rotors, linear_size + n_controls)
         Columns of states that the fidelity leaves out are zero.
     """
     engine = points_engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
@@ -69,5 +76,5 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
     used = np.zeros(len(inputs), dtype=bool)
     used[used_states(point)] = used[len(point.state) :] = True
     steps = np.where(used, steps, 0.0)
-    found = engine.jacobian(inputs, aircraft.mixing, steps, aircraft.layout.linear_owners, psi)
+    found = engine.jacobian(inputs, aircraft.rigging, steps, aircraft.layout.linear_owners, psi)
     return found.transpose(0, 2, 1)

@@ -74,6 +74,7 @@ class LinearModel(ByContent):
     state_units: tuple[str, ...]
     control_names: tuple[str, ...]
     control_units: tuple[str, ...]
+    control_axes: tuple[str, ...]
     output_names: tuple[str, ...]
     output_units: tuple[str, ...]
     steps: Array
@@ -160,7 +161,7 @@ class LinearModel(ByContent):
         LinearizationError
             The model has not all states of the body, or its other states do not settle.
         """
-        return control_effects(self.quasi_static().b, S.LINEAR_BODY_NAMES, self.control_names)
+        return control_effects(self.quasi_static().b, S.LINEAR_BODY_NAMES, self.control_names, self.control_axes)
 
     def derivatives(self, quasi_static: bool = True) -> dict[str, float]:
         """Stability and control derivatives, normalised as in Padfield, Helicopter Flight Dynamics, section 4A.2.

@@ -127,7 +127,7 @@ def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> Linear
     mean = each.mean(axis=0)
     used = used_states(point)
     size = len(point.state)
-    inputs = np.concatenate([used, size + np.arange(len(S.CONTROL_NAMES))])
+    inputs = np.concatenate([used, size + np.arange(len(aircraft.controls))])
     outputs, names, units = _outputs(aircraft, point, mean)
     weights = np.zeros((size, size))
     weights[np.ix_(used, used)] = steps[used] / steps[used, None]
@@ -138,8 +138,9 @@ def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> Linear
         d=outputs[:, size:],
         state_names=tuple(point.state_names[i] for i in used),
         state_units=tuple(aircraft.layout.linear_units[i] for i in used),
-        control_names=S.CONTROL_NAMES,
-        control_units=("rad",) * len(S.CONTROL_NAMES),
+        control_names=aircraft.control_names,
+        control_units=aircraft.control_units,
+        control_axes=tuple(control.axis for control in aircraft.controls),
         output_names=names,
         output_units=units,
         steps=steps[inputs],

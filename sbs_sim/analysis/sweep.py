@@ -7,8 +7,8 @@ from __future__ import annotations  # `help` then shows types by their names
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -37,8 +37,8 @@ ComplexArray = NDArray[np.complex128]
 
 CONDITIONS = {"airspeed": "m/s", "climb_rate": "m/s", "sideslip": "rad", "turn_rate": "rad/s"}
 ROTOR_LOADS = {"thrust": "N", "torque": "N m", "power": "W"}
-QUANTITIES = {  # of a trim, beside its states
-    **dict.fromkeys(("pitch", "roll", *S.CONTROL_NAMES), "rad"),
+ATTITUDE = dict.fromkeys(("pitch", "roll"), "rad")
+QUANTITIES = {  # of a trim, beside attitude, controls and states
     **ROTOR_LOADS,
     **dict.fromkeys(("residual", "iterations"), "1"),
 }
@@ -84,10 +84,13 @@ class Sweep:
         aircraft file, in its unit.
     points : tuple of SweepPoint
         In the order of the values.
+    controls : mapping of str to str
+        Units of the pilot controls by their names.
     """
 
     parameter: str
     points: tuple[SweepPoint, ...]
+    controls: Mapping[str, str] = field(hash=False)
 
     @cached_property
     def values(self) -> Array:
@@ -119,11 +122,12 @@ class Sweep:
         for point in self.points:
             if point.trim is not None:
                 states |= dict.fromkeys(point.trim.state_names)
-        return (*QUANTITIES, *states)
+        return (*ATTITUDE, *self.controls, *QUANTITIES, *states)
 
     def unit(self, name: str) -> str:
         """Unit of what `sweep[name]` has, and of the parameter; "1" for a plain number, empty where it is not known."""
-        known = CONDITIONS | QUANTITIES | ALSO | dict(zip(S.LINEAR_BODY_NAMES, S.LINEAR_BODY_UNITS, strict=True))
+        body = dict(zip(S.LINEAR_BODY_NAMES, S.LINEAR_BODY_UNITS, strict=True))
+        known = CONDITIONS | ATTITUDE | dict(self.controls) | QUANTITIES | ALSO | body
         if name in known:
             return known[name]
         if name not in self.names:
@@ -301,7 +305,7 @@ def sweep_flights(
     """Trim, and linearize, along one parameter; see `sweep`. The condition is zero in what is swept."""
     checks.instance("aircraft", aircraft, Aircraft, SweepError)
     if guess is not None:
-        checked_guess(aircraft.layout, guess)
+        checked_guess(aircraft, guess)
     numbers = _checked_values(values)
     linear = checks.flag("linear", linear, SweepError)
     _check_parameter(aircraft, parameter)
@@ -319,7 +323,8 @@ def sweep_flights(
 
     calls = [(aircraft, parameter, value, condition, fidelity, guess, linear) for value in numbers]
     compute(_solve, calls, keep, workers=count, cancelled=cancelled, dask=dask)
-    return Sweep(parameter, tuple(points))
+    controls = dict(zip(aircraft.control_names, aircraft.control_units, strict=True))
+    return Sweep(parameter, tuple(points), controls)
 
 
 def _checked_values(values: ArrayLike) -> list[float]:

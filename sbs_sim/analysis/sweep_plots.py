@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from sbs_sim.analysis.modes import Mode
 from sbs_sim.analysis.sweep import CONDITIONS, Sweep
 from sbs_sim.errors import ExportError
-from sbs_sim.model.state import CONTROL_NAMES, part_of
+from sbs_sim.model.state import part_of
 from sbs_sim.output.files import write
 from sbs_sim.output.plot_labels import PLAIN, name_poles
 from sbs_sim.output.plot_style import COLOURS, DASHES
+from sbs_sim.output.units import label, shown
 
 Array = NDArray[np.float64]
 
@@ -95,8 +96,15 @@ def trim_figure(sweep: Sweep) -> Figure:
     FigureCanvasAgg(figure)
     (attitude, controls), (thrust, power) = figure.subplots(2, 2)
     _curves(attitude, sweep, {name: np.degrees(sweep[name]) for name in ("pitch", "roll")}, "attitude [deg]", MIN_ANGLE)
-    angles = {name.replace("_", " "): np.degrees(sweep[name]) for name in CONTROL_NAMES}
-    _curves(controls, sweep, angles, "pilot controls [deg]", MIN_ANGLE)
+    units = set(sweep.controls.values())
+    common = len(units) == 1  # else each curve has its own
+    names = {name: name.replace("_", " ") for name in sweep.controls}
+    curves = {
+        names[name] if common else label(names[name], unit): shown(sweep[name], unit)[0]
+        for name, unit in sweep.controls.items()
+    }
+    heading = label("pilot controls", units.pop()) if common else "pilot controls"
+    _curves(controls, sweep, curves, heading, MIN_ANGLE)
     _curves(thrust, sweep, _by_rotor(sweep["thrust"]), "thrust [N]", MIN_SHARE * _largest(sweep["thrust"]))
     powers = _by_rotor(sweep["power"])
     if len(powers) > 1:

@@ -58,8 +58,9 @@ def trim(
         "newton", or "two_loop": the paper's nested loops (section 2.2), which find hover, vertical flight, and of
         `sbs` straight flight up to 1.5 m/s, or without cyclic inflow 15 m/s; elsewhere they fail.
     guess : TrimPoint, array_like or tuple, optional
-        Where to begin: a trim of an aircraft with as many rotors and blades; the four controls [rad]; or a tuple of
-        these and a linear state as in `TrimPoint.state`, of which attitude, flap, lag and inflow count. The trim to
+        Where to begin: a trim of an aircraft with as many rotors and blades; the four controls that trims find [rad, or
+        their units]; or a tuple of these and a linear state as in `TrimPoint.state`, of which attitude, flap, lag and
+        inflow count. The trim to
         which it leads is taken as it is; if it leads to none, the search goes on as without a guess.
 
     Returns
@@ -90,7 +91,7 @@ def solve_trim(
     checks.instance("aircraft", aircraft, Aircraft, TrimError)
     checks.choice("method", method, METHODS, TrimError)
     problem = TrimProblem(aircraft, fidelity)
-    start = None if guess is None else _start(problem, condition, checked_guess(aircraft.layout, guess))
+    start = None if guess is None else _start(problem, condition, checked_guess(aircraft, guess))
     if method == "two_loop":
         start = MomentumTheory(problem).guess(condition) if start is None else start
         unknowns, outer, inner = solve_by_two_loops(problem, condition, start)
@@ -99,25 +100,38 @@ def solve_trim(
     return problem.point(condition, unknowns, method, iterations)
 
 
-def checked_guess(layout: StateLayout, guess: Guess) -> TrimPoint | tuple[Array, Array | None]:
-    """A trim, or controls, shape (4,), and a linear state, shape (n,), or None.
+def checked_guess(aircraft: Aircraft, guess: Guess) -> TrimPoint | tuple[Array, Array | None]:
+    """A trim, or the unknown controls of a trim, shape (4,), and a linear state, shape (n,), or None.
 
     Raises
     ------
     TrimError
         A guess that is none, has another shape or a value out of range.
     """
+    layout = aircraft.layout
     if isinstance(guess, TrimPoint):
         if guess.state_names != layout.linear_names:
             raise TrimError("guess: allowed is a trim of an aircraft with as many rotors and blades")
+        if guess.control_names != aircraft.control_names:
+            raise TrimError(f"guess: allowed is a trim with the controls {', '.join(aircraft.control_names)}")
         return guess
     if isinstance(guess, tuple) and len(guess) == 2:
         controls, state = guess
         return (
-            _angles("guess[0]", controls, S.CONTROL_NAMES, S.CONTROL_NAMES),
+            _controls("guess[0]", controls, aircraft),
             _angles("guess[1]", state, layout.linear_names, _guessed(layout)),
         )
-    return _angles("guess", guess, S.CONTROL_NAMES, S.CONTROL_NAMES), None
+    return _controls("guess", guess, aircraft), None
+
+
+def _controls(what: str, values: ArrayLike, aircraft: Aircraft) -> Array:
+    """Unknowns of the controls that a trim finds."""
+    names = tuple(aircraft.controls[i].name for i in aircraft.trimmed_controls)
+    found = _named(what, values, names)
+    for i, value in zip(aircraft.trimmed_controls, found.tolist(), strict=True):
+        control = aircraft.controls[i]
+        checks.number(f"{what}: {control.name}", value, -control.limit, control.limit, control.unit, TrimError)
+    return np.asarray(found / aircraft.trim_scales)
 
 
 def _guessed(layout: StateLayout) -> tuple[str, ...]:
@@ -129,19 +143,25 @@ def _guessed(layout: StateLayout) -> tuple[str, ...]:
 
 def _angles(what: str, values: ArrayLike, names: tuple[str, ...], checked: tuple[str, ...]) -> Array:
     """Values by names, of which some are checked."""
-    found = checks.array(what, values, TrimError)
-    if found.shape != (len(names),):
-        raise TrimError(f"{what} has the shape {found.shape}: allowed are {len(names)} numbers, {names[0]} the first")
+    found = _named(what, values, names)
     for name, value in zip(names, found.tolist(), strict=True):
         if name in checked:
             checks.number(f"{what}: {name}", value, -MAX_UNKNOWN, MAX_UNKNOWN, "rad", TrimError)
     return found
 
 
+def _named(what: str, values: ArrayLike, names: tuple[str, ...]) -> Array:
+    """As many values as there are names."""
+    found = checks.array(what, values, TrimError)
+    if found.shape != (len(names),):
+        raise TrimError(f"{what} has the shape {found.shape}: allowed are {len(names)} numbers, {names[0]} the first")
+    return found
+
+
 def _start(problem: TrimProblem, condition: TrimCondition, guess: TrimPoint | tuple[Array, Array | None]) -> Array:
     """Unknowns of a checked guess."""
     if isinstance(guess, TrimPoint):
-        controls, state = guess.controls, guess.state
+        controls, state = problem.aircraft.trim_unknowns(guess.controls), guess.state
     else:
         controls, given = guess
         if given is None:

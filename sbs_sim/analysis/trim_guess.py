@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.aircraft.description import Rotor
+from sbs_sim.aircraft.description import TRIMMED_CONTROLS, Rotor
 from sbs_sim.aircraft.model_records import MIN_DENSITY, second_moment
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.content import ByContent
 from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model import records as R
-from sbs_sim.model import state as S
 from sbs_sim.model.airfoil import AirfoilTable
 from sbs_sim.model.solve import smallest
 
@@ -93,7 +92,8 @@ class MomentumRotor:
 
     def __init__(self, aircraft: Aircraft, model: R.Model, j: int) -> None:
         rotor = aircraft.rotors[j]
-        self.speed, self.sense, self.mixing = rotor.speed, rotor.rotation, rotor.mixing
+        self.speed, self.sense = rotor.speed, rotor.rotation
+        self.rigging = aircraft.trim_rigging[3 * j : 3 * j + 3]
         self.tip_speed, self.area = rotor.speed * rotor.radius, math.pi * rotor.radius**2
         self._axes = model.rotors["axes"][j, :, :, 0]
         self.upward = max(0.0, float(self._axes[2, 2]))
@@ -106,6 +106,10 @@ class MomentumRotor:
         self._sum_sections(rotor, rotor.elements(aircraft.options.elements), *curve)
         self._hold_blades(rotor, second_moment(aircraft, rotor), aircraft.environment.gravity)
         self.wrench = self._make_wrench(rotor.hub)
+
+    def swashplate(self, controls: Array) -> Array:
+        """Collective, lateral and longitudinal cyclic of the controls that a trim finds [rad]."""
+        return np.asarray(self.rigging[:, :-1] @ controls + self.rigging[:, -1])
 
     def _sum_sections(self, rotor: Rotor, elements: Array, slope: float, at_zero: float, drag: float) -> None:
         """Sums over the sections of all blades of the slope of lift with powers of the radius, twist and lever."""
@@ -266,7 +270,7 @@ class MomentumTheory:
         layout = self._problem.layout
         x = np.zeros(layout.size)
         if self.aircraft.environment.air_density <= MIN_DENSITY:
-            return self._problem.unknowns(0.0, 0.0, np.zeros(len(S.CONTROL_NAMES)), x)
+            return self._problem.unknowns(0.0, 0.0, np.zeros(TRIMMED_CONTROLS), x)
         found = self.balance(condition, share, controls)
         for j, rotor in enumerate(found.rotors):
             x[layout.flap(j)][:3] = [_clipped(angle, MAX_FLAP) for angle in rotor.flap]
@@ -304,7 +308,7 @@ class MomentumTheory:
         """Change of the controls, shape (4,), that gives lift and no moments: 1 rad on the collective it moves most."""
         authority = self.balance(condition).authority
         change = np.asarray(np.linalg.lstsq(authority, np.eye(4)[0], rcond=WEAKEST)[0], dtype=np.float64)
-        most = max(abs(float(rotor.mixing[0] @ change)) for rotor in self.rotors)
+        most = max(abs(float(rotor.rigging[0, :-1] @ change)) for rotor in self.rotors)
         return change / most if most > 0.0 else change
 
     def stall(self, condition: TrimCondition, unknowns: Array) -> Array:
@@ -337,7 +341,7 @@ class _Search:
         radius = max(rotor.radius for rotor in theory.aircraft.rotors)
         self._scale = 1.0 / (self._weight * np.array([1.0, radius, radius, radius]))
         self._pitch, self._roll = 0.0, self._bank
-        self._controls = np.zeros(len(S.CONTROL_NAMES)) if controls is None else controls
+        self._controls = np.zeros(TRIMMED_CONTROLS) if controls is None else controls
         self._authority = np.zeros((4, len(self._controls)))
         lifting = sum(rotor.upward**2 * rotor.area for rotor in self._rotors)
         loading = self._weight / max(lifting, MIN_UPWARD**2 * sum(rotor.area for rotor in self._rotors))
@@ -370,7 +374,7 @@ class _Search:
         found = []
         for rotor, thrust, least in zip(self._rotors, self._thrusts, self._least, strict=True):
             rotor.meet(self._velocity)
-            found.append(rotor.respond(thrust, (rotor.mixing @ self._controls).tolist(), least))
+            found.append(rotor.respond(thrust, rotor.swashplate(self._controls).tolist(), least))
         return found
 
     def _change(self, wrench: Array, responses: list[Response]) -> Array:
@@ -379,8 +383,8 @@ class _Search:
         for rotor, response in zip(self._rotors, responses, strict=True):
             by_swash = rotor.wrench @ response.slopes
             # the thrusts are not yet those of the controls
-            gap += by_swash[:, 0] * (rotor.mixing[0] @ self._controls - response.collective)
-            slopes += by_swash @ rotor.mixing
+            gap += by_swash[:, 0] * (float(rotor.swashplate(self._controls)[0]) - response.collective)
+            slopes += by_swash @ rotor.rigging[:, :-1]
         up = wrench[:3] / math.sqrt(wrench[:3] @ wrench[:3]) if wrench[2] < 0.0 else np.array([0.0, 0.0, -1.0])
         # lift and the three moments
         slopes[2], left = up @ slopes[:3], wrench + gap
@@ -399,7 +403,7 @@ class _Search:
     def _next_thrust(self, rotor: MomentumRotor, response: Response) -> float:
         """Thrust at the controls by its slope."""
         thrust = response.thrust
-        goal = thrust + response.by_collective * float(rotor.mixing[0] @ self._controls - response.collective)
+        goal = thrust + response.by_collective * (float(rotor.swashplate(self._controls)[0]) - response.collective)
         if thrust > CARRIES * self._weight / len(self._rotors):
             return min(THRUST_STEP * thrust, max(thrust / THRUST_STEP, goal))
         return goal or thrust / THRUST_STEP  # an induced velocity of zero has no slope

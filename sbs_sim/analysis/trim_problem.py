@@ -1,11 +1,12 @@
 """The equations of trim (theory.md section 8).
 
-Unknowns are pitch and roll, the four controls, and of every rotor flap, lag and inflow; equations are the averages of
-the six body accelerations, of the flap and lag accelerations and of the inflow rates.
+Unknowns are pitch and roll, the four controls that are not held, and of every rotor flap, lag and inflow; equations are
+the averages of the six body accelerations, of the flap and lag accelerations and of the inflow rates.
 """
 
 import copy
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 ATTITUDE_UNKNOWNS, CONTROL_UNKNOWNS = 2, 4
 BODY_UNKNOWNS = ATTITUDE_UNKNOWNS + CONTROL_UNKNOWNS
 BODY_STEP, ROTOR_STEP = 1e-5, 1e-6  # of the differences: m/s, rad/s, rad; rad, inflow ratio
+ROUNDING = 1e-10  # deg, or another unit, that a value may be beyond its limit
 JACOBIAN_AZIMUTHS = 4  # enough to say where to go, the residual says where to stop
 BODY_BALANCES = (
     "force ahead",
@@ -41,7 +43,8 @@ BODY_BALANCES = (
 class TrimProblem:
     """The equations of trim for one aircraft and fidelity.
 
-    Unknowns, shape (n,): pitch, roll, the four controls [rad]; then rotor by rotor flap, lag [rad] and inflow.
+    Unknowns, shape (n,): pitch, roll, the four controls that are not held [rad, or over `Aircraft.trim_scales`]; then
+    rotor by rotor flap, lag [rad] and inflow.
     Equations, shape (n,): the rates of u, v, w, p, q, r; then those of the rotor states in the unknowns' order, flap
     and lag by their accelerations.
 
@@ -118,7 +121,11 @@ class TrimProblem:
         x[S.ATTITUDE : S.ATTITUDE + 4] = euler_to_quaternion(0.0, pitch, roll)
         x[S.VELOCITY : S.RATES], x[S.RATES : S.BODY_SIZE] = condition.motion(pitch, roll)
         x[self._places] = unknowns[BODY_UNKNOWNS:]
-        return x, self.aircraft.mix(unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS])
+        return x, self.aircraft.mix(self.controls(unknowns))
+
+    def controls(self, unknowns: Array) -> Array:
+        """All controls of a vector of unknowns, shape (n_controls,)."""
+        return self.aircraft.with_held(unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS])
 
     def residual(self, condition: TrimCondition, unknowns: Array) -> Array:
         """Scaled residuals of the equations; the mean loads are left in `loads`."""
@@ -137,7 +144,7 @@ class TrimProblem:
         engine, (forward, backward) = self.engine, (sides := np.empty((2, len(unknowns), len(self.equations))))
         trim_sides(
             *(engine.code.derivative, engine.model, unknowns, steps, self._owners, condition.along_heading()),
-            *(self._places, self.equations, self.scales, self.aircraft.mixing, psi, engine.work, engine.tick),
+            *(self._places, self.equations, self.scales, self.aircraft.trim_rigging, psi, engine.work, engine.tick),
             *(engine.memory(len(unknowns)), np.empty(engine.n, dtype=np.int64), sides),
         )
         return ((forward - backward) / (2.0 * steps[:, np.newaxis])).T
@@ -148,7 +155,7 @@ class TrimProblem:
         residuals, loads = np.empty((len(unknowns), len(self.equations))), np.empty((len(unknowns), self.loads.size))
         trim_residuals(
             *(engine.code.derivative, engine.model, unknowns, condition.along_heading(), self._places, self.equations),
-            *(self.scales, self.aircraft.mixing, psi, engine.work, engine.tick, engine.memory(unknowns.shape[1])),
+            *(self.scales, self.aircraft.trim_rigging, psi, engine.work, engine.tick, engine.memory(unknowns.shape[1])),
             *(residuals, loads),
         )
         return residuals, loads
@@ -168,7 +175,7 @@ class TrimProblem:
 
     def beyond_limits(self, unknowns: Array) -> tuple[str, ...]:
         """What lies beyond its range, as "name = value deg: allowed are low to high deg"."""
-        controls = unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS]
+        controls = self.controls(unknowns)
         return _beyond_limits(self.aircraft, controls, self.aircraft.mix(controls))
 
     def point(
@@ -177,7 +184,6 @@ class TrimProblem:
         """Result of a solution."""
         residual = self.residual(condition, unknowns)
         x, swash = self.state(condition, unknowns)
-        controls = unknowns[ATTITUDE_UNKNOWNS:BODY_UNKNOWNS].copy()
         speeds = np.array([rotor.speed for rotor in self.aircraft.rotors])
         torque = self.loads[:, R.TORQUE].copy()
         return TrimPoint(
@@ -185,7 +191,9 @@ class TrimProblem:
             lead_lag=self.fidelity.lead_lag,
             cyclic_inflow=self.fidelity.cyclic_inflow,
             azimuth_count=self.fidelity.azimuth_count,
-            controls=controls,
+            controls=self.controls(unknowns),
+            control_names=self.aircraft.control_names,
+            control_units=self.aircraft.control_units,
             swashplate=swash,
             pitch=float(unknowns[0]),
             roll=float(unknowns[1]),
@@ -224,21 +232,20 @@ class TrimProblem:
 def _beyond_limits(aircraft: Aircraft, controls: Array, swash: Array) -> tuple[str, ...]:
     """What lies beyond its range, as "name = value deg: allowed are low to high deg"."""
     found = [
-        _outside(name, value, aircraft.control_ranges[name])
-        for name, value in zip(S.CONTROL_NAMES, controls, strict=True)
+        _outside(control.name, control.shown(value), [control.shown(end) for end in control.range], control.shown_unit)
+        for control, value in zip(aircraft.controls, controls.tolist(), strict=True)
     ]
     for rotor, angles in zip(aircraft.rotors, swash, strict=True):
         ranges = (rotor.collective_range, rotor.cyclic_range, rotor.cyclic_range)
         found += [
-            _outside(f"{rotor.name} {name}", value, limits)
+            _outside(f"{rotor.name} {name}", math.degrees(value), np.degrees(limits), "deg")
             for name, value, limits in zip(S.SWASHPLATE_NAMES, angles, ranges, strict=True)
         ]
     return tuple(text for text in found if text)
 
 
-def _outside(name: str, value: float, limits: tuple[float, float]) -> str:
+def _outside(name: str, value: float, limits: Iterable[float], unit: str) -> str:
     low, high = limits
-    if low - 1e-12 <= value <= high + 1e-12:
+    if low - ROUNDING <= value <= high + ROUNDING:
         return ""
-    low, high, value = (math.degrees(angle) for angle in (low, high, value))
-    return f"{name} = {value:.3f} deg: allowed are {low:g} to {high:g} deg"
+    return f"{name} = {value:.3f} {unit}: allowed are {low:g} to {high:g} {unit}"

@@ -15,7 +15,6 @@ from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import ATTITUDE_UNKNOWNS, BODY_UNKNOWNS, TrimProblem
 from sbs_sim.errors import TrimError
 from sbs_sim.flight.trim_point import TrimCondition
-from sbs_sim.model import state as S
 
 Array = NDArray[np.float64]
 Along = Callable[[float], tuple[TrimProblem, TrimCondition]]
@@ -302,7 +301,7 @@ class _Search:
         ]
         text = f", where {' and '.join(names)} {'stalls' if len(names) == 1 else 'stall'}" if names else ""
         beyond = self._problem.beyond_limits(unknowns)
-        controls = [entry for entry in beyond if entry.startswith(S.CONTROL_NAMES)]
+        controls = [entry for entry in beyond if entry.startswith(self._problem.aircraft.control_names)]
         return text + "".join(f", with {entry}" for entry in controls or beyond)
 
 

@@ -30,6 +30,7 @@ HEAVY = 1e4  # N of weight, beyond which loads are in thousands
 STEPS = (1.0, 2.0, 5.0, 10.0)  # of marks on a vertical axis, times a power of ten
 MAX_AXIS_STEPS = 3  # between the ends of a vertical axis: so many have room for their numbers
 MIN_RELATIVE_SPAN = 1e-3  # that a vertical axis covers, over the largest value: rounding is no signal
+SHORT_NAMES = dict(zip(S.CONTROL_NAMES, ("coll", "lat", "lon", "diff"), strict=True))
 DEGREES = 180.0 / math.pi
 
 
@@ -69,15 +70,18 @@ def body_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
         return lambda snapshot: list(factor * snapshot.state[first : first + 3])
 
     def controls(snapshot: Snapshot) -> list[float]:
-        return list(DEGREES * aircraft.unmix(snapshot.swashplate))
+        values = aircraft.unmix(snapshot.swashplate).tolist()
+        return [control.shown(value) for control, value in zip(aircraft.controls, values, strict=True)]
 
     def height(snapshot: Snapshot) -> list[float]:
         return [-float(snapshot.state[S.POSITION + 2])]
 
+    units = {control.shown_unit for control in aircraft.controls}
+    names = tuple(SHORT_NAMES.get(name, name.replace("_", " ")) for name in aircraft.control_names)
     return (
         Chart("Attitude", "deg", ("roll", "pitch", "yaw"), attitude, 2, 1.0),
         Chart("Rates", "deg/s", ("p", "q", "r"), part(S.RATES, DEGREES), 2, 1.0),
-        Chart("Controls", "deg", ("coll", "lat", "lon", "diff"), controls, 2, 1.0),
+        Chart("Controls", units.pop() if len(units) == 1 else "", names, controls, 2, 1.0),
         Chart("Velocity, body axes", "m/s", ("u", "v", "w"), part(S.VELOCITY, 1.0), 2, 0.5),
         Chart("Height", "m", ("above origin",), height, 2, 0.5),
     )

@@ -11,6 +11,7 @@ from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
+from sbs_sim.cockpit.control_labels import axes_of, control_label
 from sbs_sim.cockpit.panel_tools import REAL_TIME_FACTORS, Answer, by_user, notify
 from sbs_sim.cockpit.readouts import condition_here
 from sbs_sim.cockpit.trim_report import TrimResult, line, model_page, trim_page
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 
 SLIDER_STEP, KEY_STEP = 0.02, 0.1  # deg
 OLD_STATUS, OLDEST_STATUS = 0.5, 5.0  # s in which a status may still be one from before an answer; on a busy machine
-LABELS = ("Collective", "Lateral", "Longitudinal", "Differential")
+LABELS = ("Collective", "Lateral", "Longitudinal", "Differential")  # until there is an aircraft
 # Two keys of each stick, with what they do to any aircraft; they lie together, apart from those that move the camera.
 KEYS = (
     (("H", "Collective down"), ("Y", "Collective up")),
@@ -109,6 +110,7 @@ class FlyPanel:
         self._ranges = np.tile((-1.0, 1.0), (len(CONTROL_NAMES), 1))  # deg, until there is an aircraft
         self._senses = np.ones(len(CONTROL_NAMES))  # of the controls, in what their keys are to do
         self._words = [UNKNOWN] * len(CONTROL_NAMES)
+        self._labels, self._axes = list(LABELS), np.arange(len(CONTROL_NAMES))
         self._note = server.gui.add_html("", visible=False)
         self._back = server.gui.add_button("Show the live flight", visible=False)
         self._back.on_click(lambda _: back())
@@ -134,9 +136,11 @@ class FlyPanel:
             Real-time factor as it is.
         """
         self._aircraft = aircraft
-        self._senses = np.array([effect.sense for effect in effects] or [1.0] * len(CONTROL_NAMES))
-        self._words = [f"more of it, in hover: {effect.words}" for effect in effects] or [UNKNOWN] * len(CONTROL_NAMES)
-        self._ranges = np.degrees([aircraft.control_ranges[name] for name in CONTROL_NAMES])
+        axes = self._axes = axes_of(aircraft)
+        self._senses = np.array([effects[i].sense for i in axes] if effects else [1.0] * len(axes))
+        self._words = [f"more of it, in hover: {effects[i].words}" if effects else UNKNOWN for i in axes]
+        self._ranges = np.degrees([aircraft.controls[i].range for i in axes])
+        self._labels = [control_label(aircraft.controls[i].name) for i in axes]
         self._release()
         for handle in (*self.sliders, self._hold):
             handle.remove()
@@ -174,7 +178,7 @@ class FlyPanel:
         gui = self._server.gui
         with self._controls:
             self.sliders = []
-            for i, label in enumerate(LABELS):
+            for i, label in enumerate(self._labels):
                 low, high = (float(end) for end in self._ranges[i])
                 marks = tuple(
                     (value, f"{value:g}") for value in sorted({low, high} | ({0.0} if low < 0.0 < high else set()))
@@ -249,7 +253,7 @@ class FlyPanel:
         if not self._steerable:
             return
         for slider, sense, bounds, ((less, _), (more, _)) in zip(
-            self.sliders, self._senses, self._ranges, KEYS, strict=True
+            self.sliders, self._senses, self._ranges, KEYS[: len(self.sliders)], strict=True
         ):
             if key in (less, more):
                 change = KEY_STEP * sense * (1.0 if key == more else -1.0)
@@ -258,10 +262,15 @@ class FlyPanel:
 
     def doublet(self) -> None:
         """Move the longitudinal cyclic to and fro."""
-        if self._steerable and self._aircraft is not None and (snapshot := self._here()) is not None:
+        if (
+            self._steerable
+            and self._aircraft is not None
+            and len(self._axes)
+            and (snapshot := self._here()) is not None
+        ):
             self._hint.visible = False
             held = np.radians([slider.value for slider in self.sliders])
-            rest = held if self._holding else self._aircraft.unmix(snapshot.swashplate)
+            rest = held if self._holding else self._aircraft.unmix(snapshot.swashplate)[self._axes]
             push = DOUBLET_SIZE * self._senses[DOUBLET_OF] * np.eye(len(CONTROL_NAMES))[DOUBLET_OF]
             self._pilot.doublet(rest, push, DOUBLET_LENGTH)
 
@@ -376,7 +385,7 @@ class FlyPanel:
             self._show_clock(playing)
         if self._holding or self._aircraft is None:
             return
-        controls = self._aircraft.unmix(swashplate)
+        controls = self._aircraft.unmix(swashplate)[self._axes]
         for slider, value in zip(self.sliders, np.degrees(controls), strict=True):
             rounded = round(float(value), 3)
             if not abs(slider.value - rounded) <= 0.5 * SLIDER_STEP:  # true for a NaN as well

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.cockpit.control_labels import axes_of, control_label
 from sbs_sim.content import ByContent
 from sbs_sim.flight.records import Snapshot
 from sbs_sim.flight.trim_point import TrimCondition
@@ -17,7 +18,6 @@ from sbs_sim.model.frames import quaternion_to_euler
 Array = NDArray[np.float64]
 
 STEADY_ANGLE, STEADY_RATE = math.radians(2.0), math.radians(2.0)  # departures that the eye would not call unsteady
-CONTROLS = ("collective", "lateral", "longitudinal", "differential")
 FAINT, WARNING = "color:#5c6670", "color:#D55E00"
 
 
@@ -29,7 +29,7 @@ class TrimResult(ByContent):
     ----------
     condition : TrimCondition
     controls : ndarray, shape (4,)
-        [rad]
+        Of the axes heave, roll, pitch and yaw [rad].
     pitch, roll : float
         [rad]
     thrust : float
@@ -70,9 +70,10 @@ def condition_words(condition: TrimCondition) -> str:
 def trim_page(trimmed: TrimResult, snapshot: Snapshot, aircraft: Aircraft) -> str:
     """A trim beside the flight as it is, and whether the flight is in it."""
     _, pitch, roll = quaternion_to_euler(snapshot.state[S.ATTITUDE : S.VELOCITY])
-    controls = aircraft.unmix(snapshot.swashplate)
+    axes = axes_of(aircraft)
+    names = [control_label(aircraft.controls[i].name).lower() for i in axes]
     rows = [
-        *zip(CONTROLS, trimmed.controls, controls, strict=True),
+        *zip(names, trimmed.controls[: len(axes)], aircraft.unmix(snapshot.swashplate)[axes], strict=True),
         ("pitch", trimmed.pitch, pitch),
         ("roll", trimmed.roll, roll),
     ]

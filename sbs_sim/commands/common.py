@@ -121,8 +121,9 @@ def add_guess_argument(parser: argparse.ArgumentParser) -> None:
         "--guess-deg",
         nargs=4,
         type=float,
-        metavar=("COLLECTIVE", "LATERAL", "LONGITUDINAL", "DIFFERENTIAL"),
-        help="begin with these controls [deg]: the trim to which they lead is taken (default: by momentum theory)",
+        metavar=("COLLECTIVE", "LATERAL", "LONGITUDINAL", "YAW"),
+        help="begin with these values of the controls that trims find [deg, or their units]: the trim to which they"
+        " lead is taken (default: by momentum theory)",
     )
 
 
@@ -163,8 +164,8 @@ def flight(arguments: argparse.Namespace) -> "tuple[TrimCondition, Fidelity]":
     return condition, Fidelity(arguments.lead_lag, arguments.cyclic_inflow, arguments.azimuth_count)
 
 
-def guess(arguments: argparse.Namespace) -> list[float] | None:
-    """Controls to begin with [rad], if there are any.
+def guess(arguments: argparse.Namespace, craft: "Aircraft") -> list[float] | None:
+    """Controls to begin with [rad, or their units], if there are any.
 
     Raises
     ------
@@ -173,14 +174,16 @@ def guess(arguments: argparse.Namespace) -> list[float] | None:
     """
     from sbs_sim import checks
     from sbs_sim.errors import TrimError
-    from sbs_sim.model.state import CONTROL_NAMES
 
     if arguments.guess_deg is None:
         return None
-    pairs = zip(CONTROL_NAMES, arguments.guess_deg, strict=True)
-    return [
-        math.radians(checks.number(f"guess_deg: {name}", value, -90, 90, "deg", TrimError)) for name, value in pairs
-    ]
+    found = []
+    for i, value in zip(craft.trimmed_controls, arguments.guess_deg, strict=True):
+        control = craft.controls[i]
+        limit, unit = control.shown(control.limit), control.shown_unit
+        checks.number(f"guess_deg: {control.name}", value, -limit, limit, unit, TrimError)
+        found.append(math.radians(value) if control.is_angle else value)
+    return found
 
 
 def radians(name: str, degrees: float) -> float:

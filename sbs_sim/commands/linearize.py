@@ -84,7 +84,7 @@ def _work(arguments: argparse.Namespace) -> None:
     check_target(arguments.out, ENCODERS)
     check_target(arguments.json)
     craft = aircraft(arguments)
-    point = solve_trim(craft, *flight(arguments), guess=guess(arguments))
+    point = solve_trim(craft, *flight(arguments), guess=guess(arguments, craft))
     full = linearize_trim(craft, point, method=arguments.method)
     model = full.quasi_static() if arguments.quasi_static else full
     _print_model(craft, model)

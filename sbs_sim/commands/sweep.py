@@ -5,7 +5,6 @@ import math
 from typing import TYPE_CHECKING
 
 from sbs_sim.commands.common import (
-    DEGREES,
     OUTSIDE,
     UsageError,
     add_flight_arguments,
@@ -94,7 +93,7 @@ def _work(arguments: argparse.Namespace) -> None:
             parameter,
             values,
             *flight(arguments),
-            guess=guess(arguments),
+            guess=guess(arguments, craft),
             linear=arguments.linear,
             workers=arguments.workers,
             dask=arguments.dask,
@@ -148,9 +147,12 @@ def _values(arguments: argparse.Namespace) -> list[float]:
 
 def _print_sweep(found: "Sweep") -> None:
     """One row for each point, and below the errors."""
+    from sbs_sim.output.units import label
+    from sbs_sim.output.units import shown as shown_values
+
     shown, unit = found.shown
-    names = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")
-    angles = [found[name] * DEGREES for name in ("pitch", "roll", *names)]
+    columns = {"pitch": "rad", "roll": "rad", **found.controls}
+    angles = [shown_values(found[name], unit)[0] for name, unit in columns.items()]
     power = found["power"].sum(axis=1)
     rows = []
     for i, point in enumerate(found.points):
@@ -161,9 +163,9 @@ def _print_sweep(found: "Sweep") -> None:
             row += [fixed(angle[i], 3) for angle in angles]
             row += [fixed(power[i], 1), _growing(point)]
         rows.append(row)
-    labels = ("pitch", "roll", "collective", "lateral", "longitudinal", "differential")
-    headings = [f"{found.parameter} [{unit}]" if unit else found.parameter, *(f"{label} [deg]" for label in labels)]
-    print_table([*headings, "power [W]", "growing modes"], rows, left=(8,))
+    short = (label(name.removesuffix("_cyclic").removesuffix("_longitudinal"), unit) for name, unit in columns.items())
+    headings = [f"{found.parameter} [{unit}]" if unit else found.parameter, *short]
+    print_table([*headings, "power [W]", "growing modes"], rows, left=(len(headings) + 1,))
     for value, point in zip(shown, found.points, strict=True):
         if point.error is not None:
             print(f"{found.parameter} {value:g}: {_error(found, value, point)}")

@@ -58,7 +58,7 @@ def _work(arguments: argparse.Namespace) -> None:
 
     check_target(arguments.json)
     craft = aircraft(arguments)
-    point = solve_trim(craft, *flight(arguments), method=arguments.method, guess=guess(arguments))
+    point = solve_trim(craft, *flight(arguments), method=arguments.method, guess=guess(arguments, craft))
     print_trim(craft, point, linearize_trim(craft, point).control_effects)
     if arguments.json:
         write(arguments.json, to_json(point.to_dict()))
@@ -72,10 +72,11 @@ def print_trim(craft: "Aircraft", point: "TrimPoint", effects: "Sequence[Control
         ["pitch [deg]", fixed(point.pitch * DEGREES, 4), "", "nose up"],
         ["roll [deg]", fixed(point.roll * DEGREES, 4), "", "right side down"],
     ]
-    for effect, value in zip(effects, point.controls, strict=True):
-        low, high = (limit * DEGREES for limit in craft.control_ranges[effect.control])
-        moves = f"{effect.axis}: {effect.words}"
-        rows.append([f"{effect.control} [deg]", fixed(value * DEGREES, 4), f"{low:g} to {high:g}", moves])
+    for effect, value in zip(effects, point.controls.tolist(), strict=True):
+        control = craft.controls[craft.control_names.index(effect.control)]
+        low, high = (control.shown(limit) for limit in control.range)
+        heading, moves = f"{control.name} [{control.shown_unit}]", f"{effect.axis}: {effect.words}"
+        rows.append([heading, fixed(control.shown(value), 4), f"{low:g} to {high:g}", moves])
     print_table(["body and controls", "", "range", "more of it"], rows, left=(0, 3))
     print()
     print_table(["rotors", *(rotor.name for rotor in craft.rotors)], _rotor_rows(craft, point))

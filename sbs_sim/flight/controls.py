@@ -8,29 +8,30 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
+from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.mixer import check_controls
-from sbs_sim.model import state as S
 
 Array = NDArray[np.float64]
 Commands = ArrayLike | Callable[[float], ArrayLike]
 Command = Callable[[int, float], Array]  # of a tick, and its time [s]
 
 
-def command(controls: Commands) -> Command:
+def command(aircraft: Aircraft, controls: Commands) -> Command:
     """Controls of tick i at a time, whatever way they were given."""
     if callable(controls):
         function = controls
 
         def by_time(_: int, time: float) -> Array:
-            return _four(function(time))
+            return _checked(aircraft, function(time))
 
         return by_time
     rows = np.atleast_2d(checks.array("controls", controls, SimulationError))
-    if rows.ndim != 2 or rows.shape[1] != len(S.CONTROL_NAMES) or len(rows) == 0:
-        raise SimulationError(f"controls have shape {np.shape(controls)}: allowed are (4,) and (n, 4)")
+    count = len(aircraft.controls)
+    if rows.ndim != 2 or rows.shape[1] != count or len(rows) == 0:
+        raise SimulationError(f"controls have shape {np.shape(controls)}: allowed are ({count},) and (n, {count})")
     for row in rows:
-        check_controls(row)
+        check_controls(aircraft, row)
     return lambda i, _: rows[min(i, len(rows) - 1)]
 
 
@@ -43,9 +44,7 @@ def check_rows(controls: Commands, ticks: int, tick: float) -> None:
         )
 
 
-def _four(values: ArrayLike) -> Array:
+def _checked(aircraft: Aircraft, values: ArrayLike) -> Array:
     array = checks.array("controls", values, SimulationError)
-    if array.shape != (len(S.CONTROL_NAMES),):
-        raise SimulationError(f"controls have shape {array.shape}: allowed is (4,)")
-    check_controls(array)
+    check_controls(aircraft, array)
     return array

@@ -123,15 +123,15 @@ class Engine:
         )
         return rates, loads.reshape(self.rotors, -1)
 
-    def jacobian(self, point: Array, mixing: Array, steps: Array, owners: NDArray[np.int64], psi: Array) -> Array:
+    def jacobian(self, point: Array, rigging: Array, steps: Array, owners: NDArray[np.int64], psi: Array) -> Array:
         """Central differences of the outputs of `sbs_sim.model.linear`, of a model that is arranged by "points".
 
         Parameters
         ----------
         point, steps : ndarray, shape (m,)
             Linear state and controls, and half the distance of each pair of evaluations; 0 leaves a column alone.
-        mixing : ndarray, shape (3 n_rotors, n_controls)
-            Swashplate angles = mixing @ controls.
+        rigging : ndarray, shape (3 n_rotors, n_controls + 1)
+            Swashplate angles = rigging @ (controls, 1).
         owners : ndarray of int64, shape (linear_size,)
             See `Layout.linear_owners`.
         psi : ndarray, shape (n_azimuths, n_rotors)
@@ -143,10 +143,10 @@ class Engine:
             Transposed; columns that were left alone are zero.
         """
         outputs = len(owners) + SPECIFIC_FORCE_SIZE + R.LOAD_SIZE * self.rotors
-        all_owners = np.append(owners, np.full(mixing.shape[1], self.rotors))
+        all_owners = np.append(owners, np.full(rigging.shape[1] - 1, self.rotors))
         found = np.zeros((len(psi), len(point), outputs))
         jacobian(
-            *(self.code.derivative, self.model, point, mixing, steps, all_owners, psi, self.work, self.tick),
+            *(self.code.derivative, self.model, point, rigging, steps, all_owners, psi, self.work, self.tick),
             *(self.memory(len(point)), np.zeros((2, outputs)), np.zeros(self.n, dtype=np.int64), found),
         )
         return found

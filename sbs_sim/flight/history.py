@@ -44,7 +44,7 @@ class History(dict[str, Array]):
 def history(
     aircraft: Aircraft, snapshots: Sequence[Snapshot], given: Sequence[Array], warnings: Iterable[str] = ()
 ) -> History:
-    """History, see `simulate`, of as many snapshots as pilot controls [rad], each shape (4,), with further warnings."""
+    """History, see `simulate`, of snapshots and as many pilot controls, each (n_controls,), with more warnings."""
     rows = Rows(**{field.name: np.array([getattr(one, field.name) for one in snapshots]) for field in fields(Rows)})
     working = np.array([one.working for one in snapshots if one.working is not None])
     lines = (*flight_warnings(aircraft, working), *warnings)

@@ -1,7 +1,8 @@
-"""The control mixer: four pilot controls to the swashplates of all rotors, with ranges and rates.
+"""The control mixer: pilot controls to the swashplates of all rotors, with ranges and rates.
 
-Swashplate angles are `Rotor.mixing` times the pilot controls (paper section 2.1.1; theory.md section 4). Pilot controls
-are clipped to their ranges, swashplate angles to theirs, and each angle moves no faster than its actuator.
+Swashplate angles are `Aircraft.mixing` times the pilot controls, and a constant (paper section 2.1.1; theory.md section
+4). Pilot controls are clipped to their ranges, swashplate angles to theirs, and each angle moves no faster than its
+actuator.
 """
 
 from __future__ import annotations  # `help` then shows types by their names
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SimulationError
-from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
+from sbs_sim.model.state import SWASHPLATE_NAMES
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ class Mixer:
 
     def __init__(self, aircraft: Aircraft) -> None:
         self.aircraft = aircraft
-        ranges = np.array([aircraft.control_ranges[name] for name in CONTROL_NAMES])
+        ranges = np.array([control.range for control in aircraft.controls])
         self._low, self._high = ranges.T
         swash = np.array([[r.collective_range, r.cyclic_range, r.cyclic_range] for r in aircraft.rotors])
         self._swash_low, self._swash_high = swash[:, :, 0], swash[:, :, 1]
@@ -51,21 +52,23 @@ class Mixer:
         self.saturated: tuple[str, ...] = ()
 
     def set_target(self, controls: ArrayLike) -> None:
-        """Set the pilot controls [rad], shape (4,), for the next `move`.
+        """Set the pilot controls [rad, or their units], shape (n_controls,), for the next `move`.
 
         Raises
         ------
         SimulationError
-            Not four controls, or one that is not finite or beyond a right angle; the target before stays.
+            Another number of controls, or one that is not finite or beyond a right angle; the target before stays.
         """
         values = checks.array("controls", controls, SimulationError)
-        if values.shape != (len(CONTROL_NAMES),):
-            raise SimulationError(f"controls have shape {values.shape}: allowed is ({len(CONTROL_NAMES)},)")
-        check_controls(values)
+        check_controls(self.aircraft, values)
         clipped = np.clip(values, self._low, self._high)
         wanted = self.aircraft.mix(clipped)
         self._target = np.clip(wanted, self._swash_low, self._swash_high)
-        texts = _clipped(CONTROL_NAMES, values, clipped)
+        texts = [
+            f"{control.name} at its limit of {control.shown(limit):.6g} {control.shown_unit}"
+            for control, value, limit in zip(self.aircraft.controls, values.tolist(), clipped.tolist(), strict=True)
+            if abs(value - limit) > ROUNDING
+        ]
         for rotor, row, limited in zip(self.aircraft.rotors, wanted, self._target, strict=True):
             texts += _clipped([f"{rotor.name} {name}" for name in SWASHPLATE_NAMES], row, limited)
         self.saturated = tuple(texts)
@@ -112,6 +115,11 @@ class Mixer:
         return self._angles.copy()
 
     @property
+    def position(self) -> Array | None:
+        """Swashplate angles [rad], shape (n_rotors, 3); None if they are not known."""
+        return None if self._angles is None else self._angles.copy()
+
+    @property
     def arrived(self) -> bool:
         """True when the angles are those of the target."""
         if self._target is None:
@@ -119,28 +127,31 @@ class Mixer:
         return self._angles is not None and np.array_equal(self._angles, self._target)
 
 
-def check_controls(values: Array) -> None:
-    """Raise SimulationError for pilot controls [rad], shape (4,), that are not finite or beyond a right angle."""
-    if not np.abs(values).max() <= math.pi / 2:  # true for a NaN as well
-        for name, value in zip(CONTROL_NAMES, values, strict=True):
-            checks.number(name, value, -math.pi / 2, math.pi / 2, "rad", SimulationError)
+def check_controls(aircraft: Aircraft, values: Array) -> None:
+    """Raise SimulationError for another number of controls, and for what is not finite or beyond a right angle."""
+    if values.shape != (len(aircraft.controls),):
+        raise SimulationError(f"controls have shape {values.shape}: allowed is ({len(aircraft.controls)},)")
+    for control, value in zip(aircraft.controls, values.tolist(), strict=True):
+        if not abs(value) <= control.limit:  # true for a NaN as well
+            checks.number(control.name, value, -control.limit, control.limit, control.unit, SimulationError)
 
 
 def check_ranges(aircraft: Aircraft, values: Array, where: str = "") -> None:
-    """Raise SimulationError for pilot controls [rad], shape (4,), beyond their ranges, which `Mixer` would clip.
+    """Raise SimulationError for pilot controls, shape (n_controls,), beyond their ranges, which `Mixer` would clip.
 
     Parameters
     ----------
     aircraft : Aircraft
-    values : ndarray, shape (4,)
+    values : ndarray, shape (n_controls,)
     where : str
         What the message begins with.
     """
-    for name, value in zip(CONTROL_NAMES, values, strict=True):
-        low, high = aircraft.control_ranges[name]
+    for control, value in zip(aircraft.controls, values.tolist(), strict=True):
+        low, high = control.range
         if not low - ROUNDING <= value <= high + ROUNDING:  # true for a NaN as well
-            limits = f"{low:.6g} to {high:.6g} rad ({math.degrees(low):g} to {math.degrees(high):g} deg)"
-            raise SimulationError(f"{where}{name} = {value:.6g}: allowed are {limits}")
+            degrees = f" ({math.degrees(low):g} to {math.degrees(high):g} deg)" if control.is_angle else ""
+            limits = f"{low:.6g} to {high:.6g} {control.unit}{degrees}"
+            raise SimulationError(f"{where}{control.name} = {value:.6g}: allowed are {limits}")
 
 
 def _clipped(names: tuple[str, ...] | list[str], wanted: Array, limited: Array) -> list[str]:

@@ -38,8 +38,9 @@ def simulate(
     start : TrimPoint or ndarray, shape (size,)
         A trim point, flown from the origin heading north, or a simulation state.
     controls : array_like or callable
-        Pilot controls [rad]: shape (4,) for the whole flight, shape (n, 4) one row per tick (the last is held), or a
-        function of time [s] that gives shape (4,).
+        Pilot controls [rad, or their units] in the order of `Aircraft.control_names`: shape (n_controls,) for the whole
+        flight, shape (n, n_controls) one row per tick (the last is held), or a function of time [s] that gives
+        (n_controls,).
     duration : float
         [s], rounded to whole ticks.
     tick, azimuth_step, lead_lag, cyclic_inflow, method, wind, ground_altitude
@@ -54,10 +55,10 @@ def simulate(
     -------
     History
         Mapping of names to arrays, over the n instants between and at the ends of n - 1 ticks: "time" (n,) [s],
-        "controls" (n, 4), "swashplate" (n, n_rotors, 3) [rad], "acceleration" (n, 3) [m/s^2], "thrust" [N], "torque"
-        [N m], "power" [W] (n, n_rotors), "state" (n, size) and every name of the simulation state (n,), "phi", "theta",
-        "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed relative to the air [m/s]. `warnings` tells
-        where the model does not hold.
+        "controls" (n, n_controls), "swashplate" (n, n_rotors, 3) [rad], "acceleration" (n, 3) [m/s^2], "thrust" [N],
+        "torque" [N m], "power" [W] (n, n_rotors), "state" (n, size) and every name of the simulation state (n,), "phi",
+        "theta", "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed relative to the air [m/s].
+        `warnings` tells where the model does not hold.
 
     Raises
     ------

@@ -78,7 +78,7 @@ class Sortie:
         checks.instance("wind", air, Wind, SimulationError)
         state = trimmed_state(aircraft, start, wind=air.velocity) if isinstance(start, TrimPoint) else start
         initial = start.swashplate if isinstance(start, TrimPoint) else None
-        pilot_command = command(controls)
+        pilot_command = command(aircraft, controls)
         self._pilot = (Mixed if actuators else Direct)(aircraft, pilot_command, initial)
         angles = self._pilot.angles(pilot_command(0, 0.0), 0.0)
         self.simulation = Simulation(aircraft, state, angles, wind=air, **options)

@@ -134,7 +134,7 @@ class TrimPoint(ByContent):
         Fidelity.
     azimuth_count : int
         N_c of the averages.
-    controls : ndarray, shape (4,)
+    controls : ndarray, shape (n_controls,)
         Collective, lateral, longitudinal, differential longitudinal cyclic [rad].
     swashplate : ndarray, shape (n_rotors, 3)
         Angles of each rotor [rad].
@@ -167,6 +167,8 @@ class TrimPoint(ByContent):
     cyclic_inflow: bool
     azimuth_count: int
     controls: Array
+    control_names: tuple[str, ...]
+    control_units: tuple[str, ...]
     swashplate: Array
     pitch: float
     roll: float
@@ -184,17 +186,17 @@ class TrimPoint(ByContent):
     parameter_hash: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain lists and numbers for JSON, by the names of the attributes, with "control_names"."""
+        """Everything as plain lists and numbers for JSON, by the names of the attributes."""
         return dict(plain(self.contents()))
 
     def contents(self) -> dict[str, Any]:
-        """Everything by name, the condition as a mapping; with "control_names"."""
+        """Everything by name, the condition as a mapping."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {**values, "condition": asdict(self.condition), "control_names": S.CONTROL_NAMES}
+        return {**values, "condition": asdict(self.condition)}
 
     def keys(self) -> tuple[str, ...]:
         """What `point[name]` knows."""
-        return (*S.CONTROL_NAMES, *ROTOR_LOADS, "psi", S.AIRSPEED, *self.state_names)
+        return (*self.control_names, *ROTOR_LOADS, "psi", S.AIRSPEED, *self.state_names)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.keys())
@@ -222,8 +224,8 @@ class TrimPoint(ByContent):
         """
         if name in self.state_names:
             return float(self.state[self.state_names.index(name)])
-        if name in S.CONTROL_NAMES:
-            return float(self.controls[S.CONTROL_NAMES.index(name)])
+        if name in self.control_names:
+            return float(self.controls[self.control_names.index(name)])
         if name in ROTOR_LOADS:
             return getattr(self, name)
         if name == S.AIRSPEED:

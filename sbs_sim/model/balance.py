@@ -13,7 +13,7 @@ PITCH, ROLL, CONTROLS = range(3)  # first indices of the parts of the unknowns
 
 
 @entry
-def trim_residuals(derivative, model, unknowns, motion, rotor_indices, equations, scales, mixing, psi, work, tick,
+def trim_residuals(derivative, model, unknowns, motion, rotor_indices, equations, scales, rigging, psi, work, tick,
                    inputs, residuals, loads):  # fmt: skip
     """Scaled residuals of the equations of trim, averaged over the azimuth.
 
@@ -30,7 +30,7 @@ def trim_residuals(derivative, model, unknowns, motion, rotor_indices, equations
         Indices in the rate of the simulation state.
     scales : ndarray, shape (n_equations,)
         What each is divided by.
-    mixing : ndarray, shape (3 n_rotors, n_controls)
+    rigging : ndarray, shape (3 n_rotors, n_controls + 1)
     psi : ndarray, shape (count, n_rotors)
         Azimuths [rad].
     inputs : ndarray, shape (n_unknowns, n)
@@ -55,9 +55,9 @@ def trim_residuals(derivative, model, unknowns, motion, rotor_indices, equations
                 inputs[i, lane] = unknowns[number // azimuths, i]
             for j in range(psi.shape[1]):
                 tick.psi[j, lane] = psi[number % azimuths, j]
-        set_flight(model, inputs, motion, rotor_indices, mixing, tick)
+        set_flight(model, inputs, motion, rotor_indices, rigging, tick)
         derivative(
-            model, tick.stage, tick.slopes[1, : mixing.shape[0]], tick.psi, tick.wind, work, tick.slopes[0], True
+            model, tick.stage, tick.slopes[1, : rigging.shape[0]], tick.psi, tick.wind, work, tick.slopes[0], True
         )
         for lane in range(min(lanes, count - first)):
             i = (first + lane) // azimuths
@@ -68,13 +68,13 @@ def trim_residuals(derivative, model, unknowns, motion, rotor_indices, equations
 
 
 @entry
-def trim_sides(derivative, model, unknowns, steps, owners, motion, rotor_indices, equations, scales, mixing, psi, work,
+def trim_sides(derivative, model, unknowns, steps, owners, motion, rotor_indices, equations, scales, rigging, psi, work,
                tick, inputs, columns, residuals):  # fmt: skip
     """Scaled residuals on both sides of every unknown, averaged over the azimuth, as `trim_residuals` has them.
 
     Parameters
     ----------
-    derivative, model, motion, rotor_indices, equations, scales, mixing, psi, work, tick, inputs : see `trim_residuals`
+    derivative, model, motion, rotor_indices, equations, scales, rigging, psi, work, tick, inputs : see `trim_residuals`
     unknowns, steps : ndarray, shape (n_unknowns,)
         One set of unknowns, and how far the sides are from it.
     owners, columns : see `sbs_sim.model.linear.jacobian`
@@ -95,13 +95,13 @@ def trim_sides(derivative, model, unknowns, steps, owners, motion, rotor_indices
             while column < unknowns.size:
                 count, column = take_columns(steps, owners, owner, column, half // azimuths, columns)
                 set_pairs(unknowns, steps, psi, first, azimuths, columns, count, inputs, tick.psi)
-                set_flight(model, inputs, motion, rotor_indices, mixing, tick)
+                set_flight(model, inputs, motion, rotor_indices, rigging, tick)
                 if owner < rotors and not first_pass:
                     work.span[0], work.span[1] = begin, begin + blades
                 derivative(
                     model,
                     tick.stage,
-                    tick.slopes[1, : mixing.shape[0]],
+                    tick.slopes[1, : rigging.shape[0]],
                     tick.psi,
                     tick.wind,
                     work,
@@ -119,7 +119,7 @@ def trim_sides(derivative, model, unknowns, steps, owners, motion, rotor_indices
 
 
 @kernel
-def set_flight(model, inputs, motion, rotor_indices, mixing, tick):
+def set_flight(model, inputs, motion, rotor_indices, rigging, tick):
     """Simulation states, swashplate angles and still air of sets of unknowns."""
     rotors = as_records(model.rotors)
     given, x, swash = as_lanes(inputs, rotors), as_lanes(tick.stage, rotors), as_lanes(tick.slopes, rotors)[1]
@@ -127,7 +127,7 @@ def set_flight(model, inputs, motion, rotor_indices, mixing, tick):
     set_steady_flight(given[PITCH], given[ROLL], motion, x)
     for i in range(rotor_indices.size):
         x[rotor_indices[i]] = given[inputs.shape[0] - rotor_indices.size + i]
-    mix(mixing, given, CONTROLS, swash)
+    mix(rigging, given, CONTROLS, swash)
     for i in range(3):
         wind[i] = 0.0
 

@@ -11,7 +11,7 @@ SPECIFIC_FORCE_SIZE = 3
 
 
 @entry
-def jacobian(derivative, model, point, mixing, steps, owners, psi, work, tick, inputs, values, columns, out):
+def jacobian(derivative, model, point, rigging, steps, owners, psi, work, tick, inputs, values, columns, out):
     """Central differences about one point at given azimuths, as many evaluations at once as there are lanes.
 
     Two lanes are the two sides of a column at an azimuth. What belongs to a rotor changes nothing about the blades of
@@ -22,8 +22,8 @@ def jacobian(derivative, model, point, mixing, steps, owners, psi, work, tick, i
     derivative, model, work, tick : see `sbs_sim.model.integrate.advance`; the lanes are states of one aircraft
     point : ndarray, shape (m,)
         Linear state and pilot controls.
-    mixing : ndarray, shape (3 n_rotors, n_controls)
-        Swashplate angles = mixing @ controls.
+    rigging : ndarray, shape (3 n_rotors, n_controls + 1)
+        Swashplate angles = rigging @ (controls, 1).
     steps : ndarray, shape (m,)
         Half the distance of each pair of evaluations; 0 leaves a column alone.
     owners : ndarray of int64, shape (m,)
@@ -51,7 +51,7 @@ def jacobian(derivative, model, point, mixing, steps, owners, psi, work, tick, i
                 set_pairs(point, steps, psi, first, azimuths, columns, count, inputs, tick.psi)
                 if owner < rotors and not first_pass:
                     work.span[0], work.span[1] = begin, begin + blades
-                evaluate_inputs(derivative, model, inputs, mixing, work, tick)
+                evaluate_inputs(derivative, model, inputs, rigging, work, tick)
                 first_pass = False
                 for pair in range(count * azimuths):
                     k, changed = first + pair % azimuths, columns[pair // azimuths]
@@ -99,7 +99,7 @@ def set_pairs(point, steps, psi, first, azimuths, columns, count, inputs, lane_p
 
 
 @kernel
-def evaluate_inputs(derivative, model, inputs, mixing, work, tick):
+def evaluate_inputs(derivative, model, inputs, rigging, work, tick):
     """Derivative and loads at linear states and controls, heading north at the origin in still air."""
     rotors = as_records(model.rotors)
     point, x, dx = as_lanes(inputs, rotors), as_lanes(tick.stage, rotors), as_lanes(tick.slopes, rotors)
@@ -107,8 +107,8 @@ def evaluate_inputs(derivative, model, inputs, mixing, work, tick):
     set_state(point, x)
     for i in range(3):
         wind[i] = 0.0
-    mix(mixing, point, point.shape[0] - mixing.shape[1], swash)
-    angles = tick.slopes[1, : mixing.shape[0]]
+    mix(rigging, point, point.shape[0] - (rigging.shape[1] - 1), swash)
+    angles = tick.slopes[1, : rigging.shape[0]]
     derivative(model, tick.stage, angles, tick.psi, tick.wind, work, tick.slopes[0], True)
     linear_rates(point, dx[0], dx[2])
 

@@ -33,6 +33,7 @@ LINEAR_U, LINEAR_W, LINEAR_Q, LINEAR_THETA, LINEAR_V, LINEAR_P, LINEAR_PHI, LINE
 LINEAR_BODY_NAMES = ("u", "w", "q", "theta", "v", "p", "phi", "r")
 LINEAR_BODY_UNITS = ("m/s", "m/s", "rad/s", "rad", "m/s", "rad/s", "rad", "rad/s")
 CONTROL_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")
+CONTROL_AXES = ("heave", "roll", "pitch", "yaw")  # that a pilot moves with them
 EULER_NAMES, AIRSPEED = ("psi", "theta", "phi"), "V"  # outputs that follow from a simulation state
 SWASHPLATE_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic")
 COLLECTIVE, LATERAL, LONGITUDINAL = range(3)  # of SWASHPLATE_NAMES
@@ -181,6 +182,10 @@ class StateLayout:
     def linear_names(self) -> tuple[str, ...]:
         """Names of the linear state, in the paper's order."""
         return LINEAR_BODY_NAMES + self._rotor_names
+
+    def has_name(self, name: str) -> bool:
+        """A state or linear state has this name."""
+        return name in self.names or name in self.linear_names
 
     @cached_property
     def linear_units(self) -> tuple[str, ...]:

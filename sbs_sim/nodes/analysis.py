@@ -27,6 +27,7 @@ from sbs_sim.flight.trim_point import Fidelity, TrimCondition
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.nodes.analysis_conversions import model_message, sweep_messages, trim_message
 from sbs_sim.nodes.component import Component
+from sbs_sim.nodes.conversions import float64_array
 from sbs_sim.nodes.parameters import Parameter, declare
 from sbs_sim.nodes.process import run
 from sbs_sim.nodes.qos import LATCHED_QOS, SERVICE_QOS
@@ -83,6 +84,7 @@ class Analysis(Component):
         def act() -> None:
             point = solve_trim(self._aircraft, *_flight(request), method=request.method)
             response.trim, response.warnings = trim_message(self._aircraft, point), point.warnings
+            response.control_names, response.control_values = point.control_names, float64_array(point.controls)
             self._trim_point.publish(response.trim, self._now())
 
         return self.answer(response, act, "trimmed", request)
@@ -92,6 +94,7 @@ class Analysis(Component):
             point = solve_trim(self._aircraft, *_flight(request))
             model = linearize_trim(self._aircraft, point, method=request.method)
             response.model, response.warnings = model_message(self._aircraft, model), model.warnings
+            response.control_axes = model.control_axes
             self._linear_model.publish(response.model, self._now())
             if model.growing_rotor_modes:
                 done.append(f"growing rotor modes: {growing_rotor_modes_text(model, self._aircraft)}")

@@ -17,7 +17,7 @@ from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.records import Snapshot
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.average import azimuths
-from sbs_sim.nodes.conversions import StateMessages, controls_of, float64_array, swashplate_messages
+from sbs_sim.nodes.conversions import StateMessages, axis_controls_message, float64_array, swashplate_messages
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def trim_message(aircraft: Aircraft, point: trim.TrimPoint) -> TrimPoint:
     rotors.fill(_mean_snapshot(aircraft, point))
     return TrimPoint(
         condition=_condition_message(point),
-        controls=controls_of(point.controls),
+        controls=axis_controls_message(aircraft, point.controls),
         roll=point.roll,
         pitch=point.pitch,
         swashplate=swashplate_messages(point.swashplate),

@@ -1,21 +1,26 @@
 """Node `control_mixer`: pilot controls to the swashplates of all rotors (paper section 2.1.1).
 
-Subscribes `controls`, publishes `swashplate` and `diagnostics`. Ranges and rates are those of the aircraft file.
+Subscribes `controls` and `control_values`, publishes `swashplate` and `diagnostics`. Ranges and rates are those of the
+aircraft file.
 """
 
 import math
 import sys
 import time
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from numpy.typing import NDArray
 from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from sbs_msgs.msg import Controls, FlightEvent, SwashplateArray
+from sbs_msgs.msg import Controls, ControlValues, FlightEvent, SwashplateArray
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.errors import SbsError
+from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.flight.mixer import Mixer
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import SWASHPLATE_NAMES
@@ -59,7 +64,10 @@ class ControlMixer(Component):
         self._output = self.create_publisher(SwashplateArray, "swashplate", COMMAND_QOS)
         self._health = RecordedPublisher(self, DiagnosticArray, "diagnostics", STATE_QOS, log)
         self._commands = CommandMonitor(self, Controls, "controls", COMMAND_QOS, log)
+        self._by_name = CommandMonitor(self, ControlValues, "control_values", COMMAND_QOS, log)
+        self._values: NDArray[np.float64] | None = None  # of all controls, as they were commanded last
         self.create_subscription(Controls, "controls", self._on_controls, COMMAND_QOS)
+        self.create_subscription(ControlValues, "control_values", self._on_values, COMMAND_QOS)
         if loop is None:
             # The simulator owns time: rates are those of simulated time, and a pause holds the swashplates. Not by
             # use_sim_time, which listens to the one /clock of all namespaces.
@@ -82,29 +90,67 @@ class ControlMixer(Component):
         if self._loop is None or self._resets == self._loop.resets:
             return False
         self._resets = self._loop.resets
-        self._mixer.forget()
+        self._forget()
         return True
+
+    def _forget(self) -> None:
+        """What was commanded is void."""
+        self._mixer.forget()
+        self._values = None
 
     def _on_event(self, message: FlightEvent) -> None:
         """What was commanded before the aircraft was put somewhere is void."""
         if message.kind in (FlightEvent.START, FlightEvent.RESET):
             self._commands.restart()
+            self._by_name.restart()
             angles = np.array(message.swashplate).reshape(-1, len(SWASHPLATE_NAMES))
-            self._mixer.forget()
+            self._forget()
             if len(angles) == len(self._mixer.aircraft.rotors):  # else it is another aircraft's
                 self._mixer.set_position(angles)
 
     def _on_controls(self, message: Controls) -> None:
+        """The four axes; controls without an axis stay."""
+        self._take(self._commands, message, lambda: self._mixer.aircraft.axis_controls, controls_array(message))
+
+    def _on_values(self, message: ControlValues) -> None:
+        """Controls by name; the others stay."""
+        self._take(self._by_name, message, lambda: self._indices(message), np.array(message.values))
+
+    def _indices(self, message: ControlValues) -> list[int]:
+        """Indices of the named controls."""
+        names = self._mixer.aircraft.control_names
+        for name in message.names:
+            if name not in names:
+                raise SimulationError(f"names: {checks.shown(name)}: allowed are {', '.join(names)}")
+        if len(message.names) != len(set(message.names)) or len(message.names) != len(message.values):
+            counts = f"{len(message.names)} names, {len(message.values)} values"
+            raise SimulationError(f"{counts}: allowed is one value for each name")
+        return [names.index(name) for name in message.names]
+
+    def _present(self) -> NDArray[np.float64]:
+        """All controls as they were commanded, or as the swashplates tell."""
+        if self._values is not None:
+            return self._values.copy()
+        angles = self._loop.swashplate() if self._loop is not None else self._mixer.position
+        return self._mixer.aircraft.held_controls.copy() if angles is None else self._mixer.aircraft.unmix(angles)
+
+    def _take(
+        self, monitor: CommandMonitor, message: Any, indices: Callable[[], Any], values: NDArray[np.float64]
+    ) -> None:
+        """Take over some of the controls."""
         self._follow_resets()
         try:
-            self._commands.check(message)
-            self._mixer.set_target(controls_array(message))
+            monitor.check(message)
+            wanted = self._present()
+            wanted[indices()] = values
+            self._mixer.set_target(wanted)
             if self._loop is not None and self._mixer.rests:
                 self._mixer.set_position(self._loop.swashplate())
         except SbsError as error:
-            self._commands.add(error)
+            monitor.add(error)
             return
-        self._commands.accept(message, self._now())
+        self._values = wanted
+        monitor.accept(message, self._now())
         self._move()
 
     def _continue(self) -> None:
@@ -140,10 +186,10 @@ class ControlMixer(Component):
 
     def _publish_health(self) -> None:
         problems = [(DiagnosticStatus.WARN, f"clipped: {text}") for text in self._mixer.saturated]
-        problems += self._commands.problems()
+        problems += self._commands.problems() + self._by_name.problems()
         if self._loop is None and not self.count_publishers(self._time.topic_name):
             problems.append((DiagnosticStatus.WARN, f"no simulator: no node publishes {self._time.topic_name}"))
-        values = {"rate_limited": not self._mixer.arrived, **self._commands.values()}
+        values = {"rate_limited": not self._mixer.arrived, **self._commands.values_with(self._by_name)}
         message = DiagnosticArray(status=[diagnostic_status("control_mixer", problems, values)])
         message.header.stamp = to_time(self._now())
         self._health.publish(message, self._now())

@@ -66,13 +66,18 @@ def to_seconds(time: Time) -> float:
     return time.sec + 1e-9 * time.nanosec
 
 
+def axis_controls_message(aircraft: Aircraft, controls: Array) -> Controls:
+    """Message, without a stamp, of the pilot controls of the four axes; zeros if an axis has no control."""
+    return controls_of(controls[aircraft.axis_controls]) if aircraft.has_axes else Controls()
+
+
 def controls_of(controls: Array) -> Controls:
-    """Message, without a stamp, of pilot controls [rad], shape (4,)."""
+    """Message, without a stamp, of the pilot controls of the four axes [rad], shape (4,)."""
     return Controls(**dict(zip(S.CONTROL_NAMES, controls.tolist(), strict=True)))
 
 
 def controls_array(message: Controls) -> Array:
-    """Pilot controls [rad], shape (4,)."""
+    """Pilot controls of the four axes [rad], shape (4,)."""
     return np.array([getattr(message, name) for name in S.CONTROL_NAMES])
 
 

@@ -47,7 +47,7 @@ class HoverHoldNode(PilotNode):
         super().__init__("hover_hold")
         parameters = declare(self, PARAMETERS)
         self._largest_distance = parameters["largest_distance"]
-        model = hover_model(self._linearized(parameters["patience"]))
+        model = hover_model(*self._linearized(parameters["patience"]))
         found = design(model, dict.fromkeys(("forward", "right", "down"), parameters["position_limit"]))
         print("\n".join(found.describe()), flush=True)
         self._pilot = HoverHold(found)
@@ -55,8 +55,8 @@ class HoverHoldNode(PilotNode):
         self.create_subscription(PoseStamped, "target", self._on_target, COMMAND_QOS)
         self.begin()
 
-    def _linearized(self, patience: float) -> LinearModel:
-        """Linear model of hover, from the service."""
+    def _linearized(self, patience: float) -> tuple[LinearModel, list[str]]:
+        """Linear model of hover and the axes of its controls, from the service."""
         client = self.create_client(Linearize, "linearize", qos_profile=SERVICE_QOS)
         self.get_logger().info("asking linearize for the model of hover")
         last_message = time.monotonic()
@@ -81,7 +81,7 @@ class HoverHoldNode(PilotNode):
         self.destroy_client(client)
         if not answer.result().success:
             raise PilotError(f"linearize: {answer.result().message}")
-        return answer.result().model
+        return answer.result().model, answer.result().control_axes
 
     def controls_for(self, now: float, body: NDArray[np.float64]) -> NDArray[np.float64]:
         """Answer a state with controls."""

@@ -4,6 +4,7 @@ Positions inside are NED, attitudes FRD to NED; targets may come in the axes of 
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -23,7 +24,7 @@ from sbs_sim.nodes.conversions import (
     to_seconds,
 )
 from sbs_sim.nodes.number_fields import check_numbers
-from sbs_sim.pilot.hover_hold import HoverModel, checked_body
+from sbs_sim.pilot.hover_hold import HoverModel, checked_body, pilot_axes
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ MAX_TILT = math.radians(10.0)  # of a target, of which only the heading can be h
 
 
 def controls_message(controls: Array, stamp: Time) -> Controls:
-    """Message of pilot controls [rad], shape (4,)."""
+    """Message of the pilot controls of the four axes [rad], shape (4,)."""
     message = controls_of(controls)
     message.header.stamp = stamp
     return message
@@ -45,8 +46,8 @@ def check_event(message: FlightEvent) -> None:
         checked_body(to_seconds(message.header.stamp), message.state)
 
 
-def hover_model(message: LinearModel) -> HoverModel:
-    """What a design takes of a linear model of hover.
+def hover_model(message: LinearModel, control_axes: Sequence[str]) -> HoverModel:
+    """What a design takes of a linear model of hover, with the controls of the four axes only.
 
     Raises
     ------
@@ -54,15 +55,17 @@ def hover_model(message: LinearModel) -> HoverModel:
         The model is not one of hover.
     """
     n, m = len(message.state_names), len(message.control_names)
+    axes = pilot_axes(control_axes, message.control_units)
     point = message.trim
     return HoverModel.checked(
         point.condition,
         tuple(message.state_names),
         np.reshape(message.a, (n, n)),
-        np.reshape(message.b, (n, m)),
+        np.reshape(message.b, (n, m))[:, axes],
         controls_array(point.controls),
         point.pitch,
         point.roll,
+        np.arange(len(axes)),
     )
 
 

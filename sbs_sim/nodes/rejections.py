@@ -1,5 +1,6 @@
 """Counter of rejected messages."""
 
+import time
 from typing import Any
 
 from rclpy.node import Node
@@ -24,15 +25,20 @@ class Rejections:
     def __init__(self, node: Node, what: str) -> None:
         self._node, self._what = node, what
         self.count = 0
-        self._last = "none"
+        self._last, self._at = "none", 0.0  # reason, and when it came
 
     def add(self, reason: Exception) -> None:
         """Count one."""
         self.count += 1
-        self._last = str(reason)
+        self._last, self._at = str(reason), time.monotonic()
         log = self._node.get_logger()
         log.warning(f"{self._what} rejected: {reason}", throttle_duration_sec=WARNING_PERIOD)
 
     def values(self) -> dict[str, Any]:
         """Values for the diagnostics."""
         return {"rejected_messages": self.count, "last_rejection": self._last}
+
+    def values_with(self, other: "Rejections") -> dict[str, Any]:
+        """Values for the diagnostics of two topics together."""
+        latest = max((self, other), key=lambda one: one._at)
+        return {"rejected_messages": self.count + other.count, "last_rejection": latest._last}

@@ -102,7 +102,7 @@ class RemotePilot:
         return dict(zip(SETTINGS, values, strict=True)) if known else None
 
     def command(self, controls: Array | None) -> None:
-        """Hold pilot controls [rad], shape (4,), from now on; None lets go of them."""
+        """Hold the controls of the four axes [rad], shape (4,), from now on; None lets go of them."""
         self._doublet = None
         self._held = None if controls is None else controls_of(controls)
         self._hold()

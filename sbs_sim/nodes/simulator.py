@@ -21,7 +21,6 @@ from sbs_sim.flight.simulation import AZIMUTH_STEP_DEG, METHOD, METHODS, Simulat
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight_loop import FlightLoop
-from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.command_monitor import CommandMonitor
 from sbs_sim.nodes.component import Component
@@ -126,10 +125,11 @@ class Simulator(Component):
             ground_altitude=values["ground_altitude"],
             **self._fidelity,
         )
-        angles = ", ".join(
-            f"{name} {math.degrees(value):.3f}" for name, value in zip(CONTROL_NAMES, point.controls, strict=True)
+        controls = ", ".join(
+            f"{control.name} {control.shown(value):.3f} {control.shown_unit}"
+            for control, value in zip(self.aircraft.controls, point.controls.tolist(), strict=True)
         )
-        self.get_logger().info(f"{self.aircraft.name} trimmed with [deg] {angles}")
+        self.get_logger().info(f"{self.aircraft.name} trimmed with {controls}")
         return simulation
 
     def _trim(self, airspeed: float, climb_rate: float, sideslip: float, turn_rate: float) -> TrimPoint:

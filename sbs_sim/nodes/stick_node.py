@@ -38,7 +38,7 @@ class StickNode(PilotNode):
         self.settings: dict[str, Any] = declare(self, parameters)
         self._aircraft = Aircraft.load(self.settings["aircraft"])
         self._found = augmentation(linearize(self._aircraft))
-        self._current_controls: Array | None = None  # pilot controls of the latest event
+        self._current_controls: Array | None = None  # of the four axes, at the latest event
         self._first_event = 0.0
         self._other_rotors = 0  # of the aircraft that flies, if it is not the one that this node knows
         self._first: tuple[Array, float, float] | None = None  # trim at the take-over
@@ -80,7 +80,7 @@ class StickNode(PilotNode):
         if self._current_controls is None:
             self._first_event = time.monotonic()
         if self._first is None or event.kind in (FlightEvent.START, FlightEvent.RESET):
-            self._current_controls = self._aircraft.unmix(angles)
+            self._current_controls = self._aircraft.unmix(angles)[self._aircraft.axis_controls]
         if (
             self._first is not None
             and is_new

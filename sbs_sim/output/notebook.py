@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sbs_sim.model.state import CONTROL_NAMES
+from sbs_sim.output.units import label, shown
 
 if TYPE_CHECKING:
     from sbs_sim.analysis.linear_model import LinearModel
@@ -20,8 +20,9 @@ NUMBERS = "text-align:right;font-variant-numeric:tabular-nums"
 
 def trim_html(point: "TrimPoint") -> str:
     """Attitude, controls and loads of a trim."""
-    angles = [("pitch", point.pitch), ("roll", point.roll), *zip(CONTROL_NAMES, point.controls, strict=True)]
-    rows = [[f"{name} [deg]", _fixed(math.degrees(value), 4)] for name, value in angles]
+    angles = [("pitch", point.pitch, "rad"), ("roll", point.roll, "rad")]
+    angles += list(zip(point.control_names, point.controls.tolist(), point.control_units, strict=True))
+    rows = [[label(name, unit), _fixed(shown(value, unit)[0], 4)] for name, value, unit in angles]
     for name, unit, values in (("thrust", "N", point.thrust), ("power", "W", point.power)):
         rows.append([f"{name} [{unit}]", " + ".join(_fixed(value, 2) for value in values)])
     return _paragraph(f"Trim: {_condition(point)}") + _table(["", ""], rows) + _warnings(point)
@@ -48,21 +49,24 @@ def model_html(model: "LinearModel") -> str:
 
 def sweep_html(found: "Sweep") -> str:
     """Trims and growing modes along a sweep."""
-    shown, unit = found.shown
+    values, unit = found.shown
     columns = [f"{found.parameter} [{unit}]" if unit else found.parameter, "pitch [deg]", "roll [deg]"]
-    columns += [f"{name} [deg]" for name in CONTROL_NAMES] + ["power [W]", "growing modes", ""]
-    rows = [_sweep_row(value, point) for value, point in zip(shown, found.points, strict=True)]
+    columns += [label(*control) for control in found.controls.items()] + ["power [W]", "growing modes", ""]
+    rows = [_sweep_row(value, point, len(columns) - 3) for value, point in zip(values, found.points, strict=True)]
     if len(rows) > MAX_ROWS:
         half = MAX_ROWS // 2
         rows = [*rows[:half], [f"… {len(rows) - 2 * half} more …", *[""] * (len(columns) - 1)], *rows[-half:]]
     failed = f", {len(found.failed)} of them without a result" if found.failed else ""
-    return _paragraph(f"Sweep of {found.parameter}: {len(found.points)} points{failed}") + _table(columns, rows, (8, 9))
+    heading = _paragraph(f"Sweep of {found.parameter}: {len(found.points)} points{failed}")
+    return heading + _table(columns, rows, (len(columns) - 2, len(columns) - 1))
 
 
-def _sweep_row(value: float, point: "SweepPoint") -> list[str]:
+def _sweep_row(value: float, point: "SweepPoint", numbers: int) -> list[str]:
+    """Cells of a point, of which so many are numbers of the trim."""
     if point.trim is None:
-        return [f"{value:.6g}", *["–"] * 7, "", point.error or ""]
-    angles = np.degrees([point.trim.pitch, point.trim.roll, *point.trim.controls])
+        return [f"{value:.6g}", *["–"] * numbers, "", point.error or ""]
+    controls = zip(point.trim.controls.tolist(), point.trim.control_units, strict=True)
+    angles = [*np.degrees([point.trim.pitch, point.trim.roll]), *(shown(angle, unit)[0] for angle, unit in controls)]
     growing = [mode.name for mode in point.model.modes if mode.pole.real > 0.0] if point.model else []
     remarks = [*([point.error] if point.error else []), *point.trim.beyond_limits, *point.warnings]
     cells = [*(_fixed(angle, 3) for angle in angles), _fixed(point.trim.power.sum(), 1)]

@@ -18,7 +18,16 @@ from sbs_sim.errors import PilotError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.pilot.feedback import Compensator, ComplexArray, Margin, Plant, closed_loop_poles, lqr, margins
-from sbs_sim.pilot.hover_hold import AUTHORITY, DELAY, FILTER_TIME, LIMITS, MAX_STATE_INTERVAL, TICK, checked_body
+from sbs_sim.pilot.hover_hold import (
+    AUTHORITY,
+    DELAY,
+    FILTER_TIME,
+    LIMITS,
+    MAX_STATE_INTERVAL,
+    TICK,
+    checked_body,
+    pilot_axes,
+)
 
 Array = NDArray[np.float64]
 
@@ -57,10 +66,12 @@ def augmentation(model: LinearModel) -> Augmentation:
     Raises
     ------
     PilotError
-        With all its states the model doubles a departure in less than `MIN_DOUBLING_TIME`.
+        The model has no control for one of the axes heave, roll, pitch, yaw; or with all its states it doubles a
+        departure in less than `MIN_DOUBLING_TIME`.
     """
     body = [model.state_names.index(name) for name in S.LINEAR_BODY_NAMES]
-    settled_a, settled_b, _, _ = settle(model.a, model.b, body)
+    axes = pilot_axes(model.control_axes, model.control_units)
+    settled_a, settled_b, _, _ = settle(model.a, model.b[:, axes], body)
     used = [S.LINEAR_BODY_NAMES.index(name) for name in FED_BACK]
     n, m = len(used), len(S.CONTROL_NAMES)
     a = np.zeros((n + m,) * 2)
@@ -70,14 +81,14 @@ def augmentation(model: LinearModel) -> Augmentation:
     b = np.vstack([np.zeros((n, m)), np.eye(m) / FILTER_TIME])
     limits = np.array([LIMITS[name] for name in FED_BACK] + [math.inf] * m)
     gains, _, _ = lqr(a, b, limits, np.array([LIMITS[name] for name in S.CONTROL_NAMES]))
-    plant = Plant(model.a, model.b, np.eye(len(model.a))[[body[i] for i in used]])
+    plant = Plant(model.a, model.b[:, axes], np.eye(len(model.a))[[body[i] for i in used]])
     feedback = _compensator(gains[:, :n], gains[:, n:])
     poles = closed_loop_poles(plant, feedback, TICK, DELAY)
     worst = poles[np.argmax(poles.real)]
     if worst.real > math.log(2.0) / MIN_DOUBLING_TIME:
         raise PilotError(f"augmented, the complete model has a pole at {worst:.3g} rad/s: fly another condition")
     found = margins(plant, feedback, TICK, DELAY)
-    senses = np.array([effect.sense for effect in model.control_effects])
+    senses = np.array([model.control_effects[i].sense for i in axes])
     return Augmentation(gains[:, :n], gains[:, n:], poles, found, senses)
 
 
@@ -88,7 +99,9 @@ def _compensator(gains: Array, lag_gains: Array) -> Compensator:
 
 
 class StickPilot:
-    """Sticks, trim and augmentation to controls.
+    """Sticks, trim and augmentation to the controls of the axes heave, roll, pitch and yaw, in this order.
+
+    `Aircraft.with_axes` gives all controls of these four.
 
     Parameters
     ----------

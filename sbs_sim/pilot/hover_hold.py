@@ -11,7 +11,7 @@
 from __future__ import annotations  # `help` then shows types by their names
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
+from sbs_sim.aircraft import axis_controls
 from sbs_sim.analysis.linear_model import LinearModel, settle
 from sbs_sim.content import ByContent
-from sbs_sim.errors import PilotError
+from sbs_sim.errors import AircraftError, PilotError
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion, quaternion_to_euler, rotation_matrix
 from sbs_sim.pilot.feedback import Compensator, ComplexArray, Margin, Plant, closed_loop_poles, lqr, margins
@@ -55,6 +56,20 @@ AT_REST = 1e-9  # m/s, rad/s
 MAX_STATE_VALUE = 1e9  # of any value of a state that can be flown by: squares and products of them stay numbers
 
 
+def pilot_axes(axes: Sequence[str], units: Sequence[str]) -> NDArray[np.int64]:
+    """Indices of the controls that heave, roll, pitch and yaw, of the axes and units of all, shape (4,).
+
+    Raises
+    ------
+    PilotError
+        No control has one of these axes, or it is no angle.
+    """
+    try:
+        return axis_controls(axes, units)
+    except AircraftError as error:
+        raise PilotError(str(error)) from None
+
+
 @dataclass(frozen=True, eq=False)
 class HoverModel(ByContent):
     """What the design takes of a linear model of hover: x' = a x + b u about the trim.
@@ -64,10 +79,13 @@ class HoverModel(ByContent):
     state_names : tuple of str, length n
     a : ndarray, shape (n, n)
     b : ndarray, shape (n, 4)
-    controls : ndarray, shape (4,)
-        Trimmed pilot controls [rad].
+        By the controls of the four axes.
+    controls : ndarray, shape (n_controls,)
+        Trimmed pilot controls [rad, or their units].
     pitch, roll : float
         Trimmed attitude [rad].
+    axes : ndarray of int64, shape (4,)
+        Indices of the controls that heave, roll, pitch and yaw.
     """
 
     state_names: tuple[str, ...]
@@ -76,6 +94,7 @@ class HoverModel(ByContent):
     controls: Array
     pitch: float
     roll: float
+    axes: NDArray[np.int64]
 
     @classmethod
     def of(cls, model: LinearModel) -> HoverModel:
@@ -84,11 +103,11 @@ class HoverModel(ByContent):
         Raises
         ------
         PilotError
-            The model is not one of hover.
+            The model is not one of hover, or has no control for one of the axes.
         """
-        point = model.trim
+        point, axes = model.trim, pilot_axes(model.control_axes, model.control_units)
         return cls.checked(
-            point.condition, model.state_names, model.a, model.b, point.controls, point.pitch, point.roll
+            point.condition, model.state_names, model.a, model.b[:, axes], point.controls, point.pitch, point.roll, axes
         )
 
     @classmethod
@@ -104,6 +123,11 @@ class HoverModel(ByContent):
             if abs(getattr(condition, name)) > AT_REST:
                 raise PilotError(f"{name} = {getattr(condition, name):g}: allowed is a model of hover, 0")
         return cls(*values)
+
+    @property
+    def axis_trim(self) -> Array:
+        """Trimmed controls of the four axes [rad], shape (4,)."""
+        return np.asarray(self.controls[self.axes])
 
     def plant(self) -> Plant:
         """All states, then position and heading; the measured ones are body states, position and heading."""
@@ -252,7 +276,7 @@ class HoverHold:
 
     def __init__(self, found: HoverHoldDesign) -> None:
         self._gains, self._anticipation = found.gains, found.anticipation
-        self._trim = found.model.controls
+        self._trim, self._axes = found.model.controls, found.model.axes
         self._attitude = np.array([found.model.pitch, found.model.roll])
         self.restart()
 
@@ -280,7 +304,7 @@ class HoverHold:
         self._wanted = (target, checks.number("heading", heading, -MAX_STATE_VALUE, MAX_STATE_VALUE, "rad", PilotError))
 
     def controls(self, time: float, body: ArrayLike) -> Array:
-        """Pilot controls [rad], shape (4,), of a state.
+        """Pilot controls, shape (n_controls,), of a state.
 
         Parameters
         ----------
@@ -312,7 +336,9 @@ class HoverHold:
         self._departure = self._departure + new * (clipped - self._departure)
         if np.array_equal(wanted, clipped):  # integrals that cannot act would only wind up
             self._integral = self._integral + np.where(within, elapsed * error, 0.0)
-        return self._trim + self._departure
+        controls = self._trim.copy()
+        controls[self._axes] += self._departure
+        return controls
 
     def _aim(self, position: Array, heading: float) -> None:
         """Take over a new target; without any, stay."""

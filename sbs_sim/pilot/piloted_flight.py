@@ -17,7 +17,6 @@ from sbs_sim.flight.mixer import Mixer
 from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import trimmed_state
-from sbs_sim.model.state import CONTROL_NAMES
 from sbs_sim.model.wind import Wind
 
 Array = NDArray[np.float64]
@@ -43,8 +42,8 @@ def simulate_with_pilot(
     start : TrimPoint or ndarray, shape (size,)
         A trim point, flown from the origin heading north without a motion over ground in `wind`, or a simulation state.
     pilot : callable
-        Takes time [s] and simulation state, shape (size,), and gives the pilot controls [rad], shape (4,); ranges and
-        rates are those of the mixer.
+        Takes time [s] and simulation state, shape (size,), and gives the pilot controls, shape (n_controls,); ranges
+        and rates are those of the mixer.
     duration : float
         [s], rounded to whole ticks.
     wind : Wind, optional
@@ -62,7 +61,7 @@ def simulate_with_pilot(
     Raises
     ------
     PilotError
-        An aircraft that is none, a delay or a duration out of range, controls that are not four numbers.
+        An aircraft that is none, a delay or a duration out of range, another number of controls.
     SimulationError
         See `Simulation`, `Mixer.set_target`.
     """
@@ -79,14 +78,14 @@ def simulate_with_pilot(
         waiting.extend([start.controls] * delay)
     else:
         state = checks.array("start", start, PilotError)
-    given = [_asked(pilot, 0.0, state)]
+    given = [_asked(aircraft, pilot, 0.0, state)]
     mixer.set_target(given[0])
     simulation = Simulation(aircraft, state, mixer.move(0.0), wind=wind, **options)
     snapshots, clipped = [], dict[str, None]()
     for tick in range(round(duration / simulation.tick) + 1):
         if tick > 0:
             simulation.advance()
-            given.append(_asked(pilot, simulation.time, simulation.state))
+            given.append(_asked(aircraft, pilot, simulation.time, simulation.state))
         waiting.append(given[-1])
         mixer.set_target(waiting.popleft() if len(waiting) > delay else waiting[0])
         clipped |= dict.fromkeys(f"clipped: {text}" for text in mixer.saturated)
@@ -95,9 +94,9 @@ def simulate_with_pilot(
     return history(aircraft, snapshots, given, clipped)
 
 
-def _asked(pilot: Callable[[float, Array], ArrayLike], time: float, state: Array) -> Array:
-    """Controls that a pilot gives, shape (4,); what is in them is for the mixer to check."""
+def _asked(aircraft: Aircraft, pilot: Callable[[float, Array], ArrayLike], time: float, state: Array) -> Array:
+    """Controls that a pilot gives, shape (n_controls,); the mixer checks their values."""
     controls = checks.array("controls", pilot(time, state), PilotError)
-    if controls.shape != (len(CONTROL_NAMES),):
-        raise PilotError(f"controls = {checks.shown(controls.tolist())}: allowed are {len(CONTROL_NAMES)} numbers")
+    if controls.shape != (len(aircraft.controls),):
+        raise PilotError(f"controls = {checks.shown(controls.tolist())}: allowed are {len(aircraft.controls)} numbers")
     return controls

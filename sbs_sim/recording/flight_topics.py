@@ -24,6 +24,7 @@ TYPES = {  # of the roles that are found by them
     "inflow": "sbs_msgs/InflowArray",
     "events": "sbs_msgs/FlightEvent",
     "controls": "sbs_msgs/Controls",
+    "control_values": "sbs_msgs/ControlValues",
     "swashplate": "sbs_msgs/SwashplateArray",
     "status": "sbs_msgs/SimulationStatus",
     "odom": "nav_msgs/Odometry",

@@ -92,7 +92,7 @@ def schema_keys():
     schema = json.loads((ROOT / "config/aircraft.schema.json").read_text(encoding="utf-8"))["properties"]
     keys = set(schema)
     for part in ("environment", "body", "options", "controls"):
-        keys |= {f"{part}.{key}" for key in schema[part]["properties"]}
+        keys |= {f"{part}.{key}" for key in schema[part].get("properties", ())}
     return keys | {f"rotors.{key}" for key in schema["rotors"]["items"]["properties"]}
 
 

@@ -1,5 +1,6 @@
 """The nodes as a user meets them: real processes, real DDS on loopback."""
 
+import json
 import math
 import re
 import signal
@@ -14,6 +15,7 @@ rclpy = pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import Point, Vector3  # noqa: E402
+from helpers import renamed_data  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
@@ -34,13 +36,14 @@ from std_srvs.srv import SetBool  # noqa: E402
 from sbs_msgs.msg import (  # noqa: E402
     BodyState,
     Controls,
+    ControlValues,
     InflowArray,
     RotorStateArray,
     SimulationStatus,
     SwashplateArray,
     WorkingState,
 )
-from sbs_msgs.srv import Reset, SetWind, Step  # noqa: E402
+from sbs_msgs.srv import Reset, SetWind, Step, Trim  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.nodes.qos import SERVICE_QOS  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
@@ -458,6 +461,55 @@ def test_simulator_and_mixer_in_two_processes(own_world, hover):
     assert mixer.interrupt() == 0
     assert simulator.running
     assert simulator.interrupt() == 0
+
+
+def test_controls_of_other_names_are_commanded_by_name_and_by_axis(own_world, tmp_path):
+    """An aircraft with a lever, pedals and a trimmer: what is not named stays, and `controls` moves the four axes."""
+    data = renamed_data()
+    data["controls"]["lever"] = {"range_deg": [0.0, 20.0], "axis": "heave"}
+    for rotor in data["rotors"]:
+        rotor["mixing"]["collective"] = {"lever": 1.0}
+    path = tmp_path / "renamed.yaml"
+    path.write_text(json.dumps(data))
+    own_world.start("simulator", aircraft=str(path), record=tmp_path / "a.mcap")
+    client = own_world.client
+    for topic, kind in (("state", BodyState), ("swashplate", SwashplateArray), ("diagnostics", DiagnosticArray)):
+        client.watch(topic, kind)
+    client.next("state")
+    found = client.call(Trim, "trim")
+    values = dict(zip(found.control_names, found.control_values, strict=True))
+    assert list(values) == ["pedal", "stick_forward", "stick_right", "lever", "trimmer"]
+    assert values["trimmer"] == math.radians(0.5)
+    assert found.trim.controls.collective == values["lever"]
+    assert found.trim.controls.differential_longitudinal_cyclic == values["pedal"]
+    lever = values["lever"] + DEGREE
+    message = ControlValues(names=["lever"], values=[lever])
+    moved = client.publish_until("control_values", message, "swashplate", lambda m: m.rotors[0].collective > lever)
+    np.testing.assert_allclose(moved.rotors[0].lateral_cyclic, found.trim.swashplate[0].lateral_cyclic, atol=1e-9)
+    higher = Controls(collective=lever + DEGREE)
+    top = lever + 2 * DEGREE - 1e-6  # the constant is one degree
+    moved = client.publish_until("controls", higher, "swashplate", lambda m: m.rotors[0].collective > top)
+    trimmer = moved.rotors[0].lateral_cyclic - found.trim.swashplate[0].lateral_cyclic + values["stick_right"]
+    np.testing.assert_allclose(trimmer, 0.0, atol=1e-9)  # the stick is in the middle, the trimmer where it was
+    for wrong in (ControlValues(names=["throttle"], values=[0.1]), ControlValues(names=["lever"], values=[0.1, 0.2])):
+        before = rejected_messages(client)
+        client.publish("control_values", wrong)
+        client.next("diagnostics", lambda m, count=before: (rejected_in(m) or 0) > count)
+    wrong = ControlValues(names=["lever"], values=[math.nan])
+    before = rejected_messages(client)
+    client.publish("control_values", wrong)
+    told = client.next("diagnostics", lambda m: (rejected_in(m) or 0) > before)
+    reasons = [v.value for v in status_of(told, "control_mixer").values if v.key == "last_rejection"]
+    assert reasons[0].startswith("lever = nan: allowed are")
+
+
+def rejected_in(message):
+    status = status_of(message, "control_mixer")
+    return status and next(int(v.value) for v in status.values if v.key == "rejected_messages")
+
+
+def rejected_messages(client):
+    return rejected_in(client.next("diagnostics", lambda m: status_of(m, "control_mixer")))
 
 
 def test_namespaces_remaps_and_a_name_of_its_own(own_world):

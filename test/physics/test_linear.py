@@ -53,7 +53,7 @@ def jacobians(model, point, steps, psi):
     size = layout.linear_size + SPECIFIC_FORCE_SIZE + 2 * R.LOAD_SIZE
     found = np.full((len(psi), len(point), size), np.nan)
     jacobian(
-        *(engine.code.derivative, engine.model, point, model.aircraft.mixing, steps, owners, psi),
+        *(engine.code.derivative, engine.model, point, model.aircraft.rigging, steps, owners, psi),
         *(engine.work, engine.tick, engine.memory(len(point)), np.empty((2, size))),
         *(np.empty(engine.n, dtype=np.int64), found),
     )

@@ -2,6 +2,7 @@
 
 import copy
 import functools
+import math
 
 import numba
 import numpy as np
@@ -292,3 +293,32 @@ def wind_velocity(air, time, fraction=0.0):
 def _blow(air, time, fraction, like, out):
     records = as_records(like)
     W.wind_at(as_lanes(air, records), time, fraction, as_lanes(out, records))
+
+
+RENAMED_CONTROLS = {
+    "lever": ("collective", "heave"),
+    "stick_right": ("lateral_cyclic", "roll"),
+    "stick_forward": ("longitudinal_cyclic", "pitch"),
+    "pedal": ("differential_longitudinal_cyclic", "yaw"),
+}
+PITCH_PER_INCH = math.radians(2.0)
+
+
+def renamed_data():
+    """The side-by-side helicopter with names of its own in another order, a lever in inches, and a fifth control."""
+    data = aircraft_data()
+    names = {old: new for new, (old, _) in RENAMED_CONTROLS.items()}
+    order = ("pedal", "stick_forward", "stick_right", "lever")
+    data["controls"] = {
+        name: data["controls"][RENAMED_CONTROLS[name][0]] | {"axis": RENAMED_CONTROLS[name][1]} for name in order
+    } | {"trimmer": {"range_deg": [-3.0, 3.0], "held_deg": 0.5}}
+    data["controls"]["lever"] = {"range": [0.0, 10.0], "unit": "in", "axis": "heave"}
+    for rotor, sense in zip(data["rotors"], (1.0, -1.0), strict=True):
+        rotor["mixing"] = {
+            angle: {names[control]: factor for control, factor in rotor["mixing"][angle].items()}
+            for angle in S.SWASHPLATE_NAMES
+        }
+        rotor["mixing"]["collective"] = {"lever": PITCH_PER_INCH}
+        rotor["mixing"]["lateral_cyclic"]["trimmer"] = sense
+        rotor["swashplate_offset_deg"] = {"collective": 1.0, "lateral_cyclic": -0.5 * sense}
+    return data

@@ -103,6 +103,7 @@ def _explain(error: Any) -> str:
         "minLength": "a text that is not empty",
         "pattern": "a name of lower-case letters, digits and underscores that begins with a letter",
         "maxLength": f"a name of at most {limit} characters",
+        "not": error.schema["description"] if rule == "not" else "",
     }.get(rule, error.message)
     return f"{path or 'file'} = {checks.shown(value)}: allowed is {allowed}"
 

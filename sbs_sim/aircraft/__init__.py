@@ -22,7 +22,17 @@ from sbs_sim.aircraft.consistency import consistency_problems
 from sbs_sim.aircraft.declaration import cached_by_class, declarations, frozen, schema_of, values_of
 from sbs_sim.aircraft.description import Array, Description, Range, Rotor
 from sbs_sim.aircraft.model_records import model_of, with_fidelity
-from sbs_sim.aircraft.paths import Location, check_path, locations, mirrored, replaced, separate, value_at
+from sbs_sim.aircraft.paths import (
+    Location,
+    check_path,
+    instead_of,
+    locations,
+    mirrored,
+    replaced,
+    separate,
+    value_at,
+    without,
+)
 from sbs_sim.content import same
 from sbs_sim.errors import AircraftError
 from sbs_sim.model.airfoil import AirfoilTable, stall_angles
@@ -153,7 +163,8 @@ class Aircraft(Description):
         values : mapping of str to value
             Paths and values as for `with_value`. Where two paths stand for one value the later one counts:
             {"rotors.radius": 0.4, "rotors.MR1.radius": 0.5}. An element of the inertia off the diagonal sets the
-            symmetric one, too: "body.inertia[0][1]" is "body.inertia[1][0]".
+            symmetric one, too: "body.inertia[0][1]" is "body.inertia[1][0]". "environment.altitude" takes the place
+            of density, viscosity and speed of sound.
 
         Raises
         ------
@@ -167,6 +178,7 @@ class Aircraft(Description):
             for location in locations(data, schema_of(type(self)), path):
                 for one in (location, mirrored(location)):
                     data = replaced(data, one, value)
+                data = without(data, instead_of(location), plain)
                 _check_pair(pairs, location, path, value)
         try:
             return self._made_of(data, self.folder, self)

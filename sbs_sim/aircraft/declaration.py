@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -52,13 +53,16 @@ class Declaration:
     symbol : str
         LaTeX, as in the table of symbols of docs/theory.md; several with ", " between them.
     default : object
-        What counts where the file leaves the key out, in the unit of the file; REQUIRED for a key that each file needs.
+        What counts where the file leaves the key out, in the unit of the file; REQUIRED for a key that each file needs,
+        None for one without which there is nothing.
     is_physics : bool
         The value counts in `Aircraft.parameter_hash`.
     model_field : str
         Field of the compiled model's records with the same value; empty if there is none.
     record : type or None
         Dataclass of the part, or of each of the parts, that the value consists of.
+    is_derivable : bool
+        The key may be left out without a default, since the schema of the part allows others in its place.
     """
 
     text: str
@@ -71,10 +75,11 @@ class Declaration:
     is_physics: bool = True
     model_field: str = ""
     record: type | None = None
+    is_derivable: bool = False
 
     @property
     def is_required(self) -> bool:
-        """A file must have the key."""
+        """A value without a default."""
         return self.default is REQUIRED
 
     @property
@@ -91,13 +96,13 @@ class Declaration:
     def full_schema(self) -> dict[str, Any]:
         """JSON schema with the default and the description, which ends with the unit."""
         unit = f" [{self.unit}]" if self.unit not in ("", "1") else ""
-        default = {} if self.is_required else {"default": self.default}
+        default = {} if self.is_required or self.default is None else {"default": self.default}
         return {**self.schema, **default, "description": f"{self.text}{unit}"}
 
     @property
     def internal_default(self) -> Any:
         """Internal value of the default; REQUIRED for a key that each file needs."""
-        return REQUIRED if self.is_required else self.read(self.default)
+        return self.default if self.is_required or self.default is None else self.read(self.default)
 
     def read_from(self, data: Mapping[str, Any]) -> Any:
         """Internal value from the checked mapping of the part."""
@@ -151,9 +156,20 @@ def string(text: str, *, may_be_empty: bool = False, **more: Any) -> Any:
     return declared(text, {"type": "string"} if may_be_empty else {"type": "string", "minLength": 1}, str, **more)
 
 
-def part(text: str, record: type, **more: Any) -> Any:
-    """Declare a mapping whose keys are the declared fields of a dataclass."""
-    return declared(text, schema_of(record), lambda data: read(record, data), record=record, **more)
+def part(
+    text: str,
+    record: type,
+    rules: Mapping[str, Any] = MappingProxyType({}),
+    complete: Callable[[Any], Any] = lambda data: data,
+    **more: Any,
+) -> Any:
+    """Declare a mapping whose keys are the declared fields of a dataclass.
+
+    `rules` are further keywords of its schema; `complete` adds values that follow from others to the mapping.
+    """
+    return declared(
+        text, {**schema_of(record), **rules}, lambda data: read(record, complete(data)), record=record, **more
+    )
 
 
 def parts(text: str, record: type, minimum: int, maximum: int, **more: Any) -> Any:
@@ -214,6 +230,11 @@ def named_schema(values: Mapping[str, Any], **more: Any) -> dict[str, Any]:
     return {"type": "object", "propertyNames": names, "additionalProperties": values, **more}
 
 
+def left_out(where: str) -> dict[str, Any]:
+    """JSON schema of a key that may not be there; `where` says when."""
+    return {"not": {}, "description": f"to leave the key out {where}"}
+
+
 # -- what follows from the declarations ----------------------------------------------------------------
 
 
@@ -248,7 +269,7 @@ def schema_of(record: type) -> dict[str, Any]:
             inner["properties"][nested[0]] = declaration.full_schema
             if declaration.is_required:
                 inner["required"] = sorted({*inner["required"], nested[0]})
-        if declaration.is_required and first not in required:
+        if declaration.is_required and not declaration.is_derivable and first not in required:
             required.append(first)
     return mapping_schema(properties, required)
 

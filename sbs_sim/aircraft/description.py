@@ -6,12 +6,14 @@ file. The attributes are in SI units and radians; docs/reference/aircraft.md lis
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.aircraft.atmosphere import MAX_ALTITUDE, MIN_ALTITUDE, standard_air
 from sbs_sim.aircraft.declaration import (
     array,
     choice,
@@ -19,6 +21,7 @@ from sbs_sim.aircraft.declaration import (
     frozen,
     integer,
     interval,
+    left_out,
     list_schema,
     mapping_schema,
     named_schema,
@@ -43,17 +46,70 @@ TRIMMED_CONTROLS = 4  # that a trim finds
 class Environment:
     """Air and gravity."""
 
-    air_density: float = number("Air density; 0 is vacuum", 0, 100, "kg/m^3", symbol=r"\rho", model_field="density")
-    kinematic_viscosity: float = number("Kinematic viscosity of the air", 1e-9, 1, "m^2/s", symbol=r"\nu")
+    air_density: float = number(
+        "Air density; 0 is vacuum; follows from `altitude` where the file has that",
+        0,
+        100,
+        "kg/m^3",
+        symbol=r"\rho",
+        model_field="density",
+        is_derivable=True,
+    )
+    kinematic_viscosity: float = number(
+        "Kinematic viscosity of the air; follows from `altitude` where the file has that",
+        1e-9,
+        1,
+        "m^2/s",
+        symbol=r"\nu",
+        is_derivable=True,
+    )
     gravity: float = number("Acceleration of gravity", 0, 100, "m/s^2", symbol="g", model_field="gravity")
     speed_of_sound: float = number(
-        "Speed of sound, for the warning of high Mach numbers only",
+        "Speed of sound, for the warning of high Mach numbers only; follows from `altitude` where the file has that",
         1,
         10000,
         "m/s",
         default=340.3,  # ISO 2533, standard atmosphere, at sea level
         is_physics=False,
     )
+    altitude: float | None = number(
+        "Pressure altitude in the standard atmosphere, instead of density, viscosity and speed of sound",
+        MIN_ALTITUDE,
+        MAX_ALTITUDE,
+        "m",
+        symbol="H",
+        default=None,
+        is_physics=False,  # the density and the viscosity that follow are
+    )
+    temperature_offset: float = number(
+        "Temperature above that of the standard atmosphere at the same pressure",
+        -60,
+        60,
+        "K",
+        symbol=r"\Delta T",
+        default=0.0,
+        is_physics=False,
+    )
+
+
+# Keys of the environment of which a file has the first three or the last two.
+GIVEN_AIR, STANDARD_AIR = ("air_density", "kinematic_viscosity", "speed_of_sound"), ("altitude", "temperature_offset")
+AIR_RULES = {
+    "if": {"required": ["altitude"]},
+    "then": {"properties": {key: left_out("where the file has environment.altitude") for key in GIVEN_AIR}},
+    "else": {
+        "required": ["air_density", "kinematic_viscosity"],
+        "properties": {"temperature_offset": left_out("where the file has no environment.altitude")},
+    },
+}
+
+
+def _with_air(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Mapping of the environment with the air of its altitude."""
+    if "altitude" not in data:
+        return data
+    air = standard_air(float(data["altitude"]), float(data.get("temperature_offset", 0.0)))
+    return {**data, **{key: getattr(air, key.removeprefix("air_")) for key in GIVEN_AIR}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,7 +386,7 @@ class Description(ByContent):
 
     name: str = string("Name of the aircraft")
     description: str = string("What the aircraft is, in a line", may_be_empty=True, default="")
-    environment: Environment = part("Air and gravity", Environment)
+    environment: Environment = part("Air and gravity", Environment, AIR_RULES, _with_air)
     body: Body = part("The whole aircraft, blades included", Body)
     options: Options = part("How the model reads the equations", Options)
     controls: tuple[Control, ...] = _controls()

@@ -7,7 +7,7 @@ from typing import Any
 
 from sbs_sim import checks
 from sbs_sim.aircraft.declaration import units
-from sbs_sim.aircraft.description import Description
+from sbs_sim.aircraft.description import GIVEN_AIR, Description
 from sbs_sim.errors import AircraftError
 
 Location = tuple[str | int, ...]
@@ -113,6 +113,19 @@ def mirrored(location: Location) -> Location:
     if location[:-2] == SYMMETRIC and len(location) == len(SYMMETRIC) + 2:
         return (*SYMMETRIC, location[-1], location[-2])
     return location
+
+
+def instead_of(location: Location) -> tuple[str, ...]:
+    """Paths whose values the one at a location replaces: an altitude those of the air that follow from it."""
+    is_altitude = location[:1] == ("environment",) and location[1] == "altitude"
+    return tuple(f"environment.{key}" for key in GIVEN_AIR) if is_altitude else ()
+
+
+def without(data: Any, paths: Sequence[str], kept: Mapping[str, Any]) -> Any:
+    """Copy of the mapping of an aircraft file without the values at some paths of two keys, but for those kept."""
+    for part, key in (path.split(".") for path in paths if path not in kept):
+        data = {**data, part: {name: value for name, value in data[part].items() if name != key}}
+    return data
 
 
 def separate(data: Any) -> Any:

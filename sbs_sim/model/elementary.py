@@ -1,4 +1,4 @@
-"""Exponential, sine and cosine of a number, rounded right: the same on every machine.
+"""Exponential, power, sine and cosine of a number, rounded right: the same on every machine.
 
 The mathematical libraries of systems differ in the last bit. What is worked out once, when an aircraft or a wind is
 made, comes from here; lanes have `sbs_sim.model.trigonometry`.
@@ -21,6 +21,12 @@ def exponential(x: float) -> float:
 def exponential_less_one(x: float) -> float:
     """e^x - 1, with all digits where x is small."""
     return float(DIGITS.subtract(DIGITS.exp(Decimal(x)), 1))
+
+
+@lru_cache(maxsize=1024)
+def power(base: float, exponent: float) -> float:
+    """Power of a number above zero."""
+    return float(DIGITS.power(Decimal(base), Decimal(exponent)))
 
 
 @lru_cache(maxsize=1024)

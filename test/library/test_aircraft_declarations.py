@@ -62,8 +62,10 @@ def test_the_schema_has_types_and_ranges():
         "additionalProperties": False,
     }
     environment = schema["properties"]["environment"]
-    assert environment["required"] == ["air_density", "gravity", "kinematic_viscosity"]
-    assert list(environment["properties"]) == ["air_density", "kinematic_viscosity", "gravity", "speed_of_sound"]
+    assert environment["required"] == ["gravity"]
+    assert environment["else"]["required"] == ["air_density", "kinematic_viscosity"]
+    given = ["air_density", "kinematic_viscosity", "gravity", "speed_of_sound"]
+    assert list(environment["properties"]) == [*given, "altitude", "temperature_offset"]
 
 
 @pytest.mark.parametrize("record", RECORDS)

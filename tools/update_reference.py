@@ -387,7 +387,8 @@ def allowed(schema: Mapping[str, Any]) -> str:
     if kind == "array":
         sizes = []
         while schema["type"] == "array":
-            sizes.append(str(schema["minItems"]))
+            fixed = schema["minItems"] == schema["maxItems"]
+            sizes.append(f"{'' if fixed else 'up to '}{schema['maxItems']}")
             schema = schema["items"]
         return f"{' × '.join(sizes)} numbers, each {allowed(schema)}"
     low = f"{schema['minimum']:g}" if "minimum" in schema else f"above {schema['exclusiveMinimum']:g}"

@@ -209,10 +209,7 @@ class Aircraft(Description):
         """
         digest = hashlib.sha256()
         for part in (self.environment, self.body, self.options, *self.rotors):
-            for name, declaration in declarations(type(part)).items():
-                value = getattr(part, name)
-                if declaration.is_physics and not same(value, declaration.internal_default):
-                    _digest(digest, name, self._factors(value) if name == "mixing" else value)
+            self._digest_part(digest, part)
         if self.control_names != CONTROL_NAMES or any(c.held is not None or not c.is_angle for c in self.controls):
             for control in self.controls:
                 held = math.nan if control.held is None else control.held
@@ -248,6 +245,19 @@ class Aircraft(Description):
     def mixing(self) -> Array:
         """Swashplate angles of all rotors over the pilot controls, shape (3 n_rotors, n_controls)."""
         return frozen(np.concatenate([self._factors(rotor.mixing) for rotor in self.rotors]))
+
+    def _digest_part(self, digest: Any, part: object) -> None:
+        """Add the values of a part of the file that have not their default, those of its own parts included."""
+        for name, declaration in declarations(type(part)).items():
+            value = getattr(part, name)
+            if not declaration.is_physics or same(value, declaration.internal_default):
+                continue
+            if declaration.record is None:
+                _digest(digest, name, self._factors(value) if name == "mixing" else value)
+                continue
+            for inner in value if isinstance(value, tuple) else (value,):
+                digest.update(f"{name}:".encode())
+                self._digest_part(digest, inner)
 
     def _factors(self, mixing: Mapping[str, Mapping[str, float]]) -> Array:
         """Factors of one rotor, shape (3, n_controls)."""

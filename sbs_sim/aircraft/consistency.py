@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sbs_sim.aircraft.description import TRIMMED_CONTROLS, Array, Range, Rotor
+from sbs_sim.aircraft.part_consistency import part_problems
 from sbs_sim.model.state import CONTROL_NAMES, EULER_NAMES, SWASHPLATE_NAMES
 
 if TYPE_CHECKING:
@@ -28,13 +29,19 @@ def consistency_problems(aircraft: "Aircraft") -> list[str]:
             if value in ("paper", "axis_to_tip"):
                 problems.append(f"options.{key} = {value!r}: allowed with options.coupling = paper only")
     problems += _control_problems(aircraft)
+    problems += part_problems(aircraft)
     for i, rotor in enumerate(aircraft.rotors):
         problems += [f"rotors[{i}].{problem}" for problem in _rotor_problems(rotor)]
     names = [rotor.name for rotor in aircraft.rotors]
-    for path, name in (("name", aircraft.name), *((f"rotors[{i}].name", name) for i, name in enumerate(names))):
+    surfaces = [surface.name for surface in aircraft.body.surfaces]
+    named = [("name", aircraft.name), *((f"rotors[{i}].name", name) for i, name in enumerate(names))]
+    for path, name in (*named, *((f"body.surfaces[{i}].name", name) for i, name in enumerate(surfaces))):
         if not name.isprintable():  # names appear in terminals and web pages
             problems.append(f"{path} = {name!r}: allowed are printable characters")
     problems += [f"rotors[{i}].name = {name!r}: used twice" for i, name in enumerate(names) if name in names[:i]]
+    problems += [
+        f"body.surfaces[{i}].name = {name!r}: used twice" for i, name in enumerate(surfaces) if name in surfaces[:i]
+    ]
     if problems:
         return problems
     mass, _, inertia = aircraft.fuselage()

@@ -139,6 +139,18 @@ def array(text: str, minimum: float, maximum: float, unit: str, *, shape: tuple[
     return declared(text, schema, frozen, unit=unit, **more)
 
 
+def series(text: str, minimum: float, maximum: float, unit: str, **more: Any) -> Any:
+    """Declare a list of up to 100 numbers, an array that cannot be written to; empty where the file has none."""
+    convert = converter(unit)
+    schema = list_schema(number_schema(minimum, maximum), 0, 100)
+    return declared(
+        text,
+        schema,
+        lambda values: frozen([convert(float(value)) for value in values]),
+        **{"unit": unit, "default": [], **more},
+    )
+
+
 def interval(text: str, minimum: float, maximum: float, unit: str, **more: Any) -> Any:
     """Declare a pair of a lower and an upper end."""
     schema = list_schema(number_schema(minimum, maximum), 2, 2)

@@ -29,6 +29,7 @@ from sbs_sim.aircraft.declaration import (
     number_schema,
     part,
     parts,
+    series,
     string,
 )
 from sbs_sim.content import ByContent
@@ -37,7 +38,7 @@ from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, SWASHPLATE_NAMES
 Array = NDArray[np.float64]
 Range = tuple[float, float]
 
-MAX_ROTORS, MAX_CONTROLS = 16, 16
+MAX_ROTORS, MAX_CONTROLS, MAX_SURFACES = 16, 16, 32
 MAX_CONTROL = 1e6  # of a control that is no angle, in its unit
 TRIMMED_CONTROLS = 4  # that a trim finds
 
@@ -113,6 +114,131 @@ def _with_air(data: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 @dataclass(frozen=True, eq=False)
+class Wash(ByContent):
+    """Wash of a rotor where a part of the body is: factors of its mean induced velocity over the skew of its wake."""
+
+    rotor: str = string("Name of the rotor whose wash the part meets; empty for none", may_be_empty=True, default="")
+    skew: Array = series(
+        "Angles of the wake to the shaft, aft positive, increasing", -180, 180, "deg", symbol=r"\chi", default=[0.0]
+    )
+    down: Array = series(
+        "Velocity down along the shaft over the mean induced velocity, for each angle",
+        -10,
+        10,
+        "1",
+        symbol="k_z",
+        default=[1.0],
+    )
+    aft: Array = series(
+        "Velocity aft across the shaft over the mean induced velocity, for each angle, or one for all",
+        -10,
+        10,
+        "1",
+        symbol="k_x",
+        default=[0.0],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule(ByContent):
+    """Incidence of a surface over the airspeed, straight between the points and level outside."""
+
+    airspeed: Array = series("Airspeeds, increasing", 0, 1000, "m/s")
+    incidence: Array = series("Incidence to be added at each of them", -90, 90, "deg", symbol="i")
+
+
+@dataclass(frozen=True, eq=False)
+class Polar(ByContent):
+    """Coefficients of a surface over the angle of attack, in place of a straight lift curve and its stall."""
+
+    angle_deg: Array = series("Angles of attack in degrees, from -90 to 90 or -180 to 180", -180, 180, "1")
+    lift: Array = series("Lift coefficients", -10, 10, "1")
+    drag: Array = series("Drag coefficients", 0, 10, "1")
+
+
+@dataclass(frozen=True, eq=False)
+class Surface(ByContent):
+    """One lifting surface.
+
+    `position` has the shape (3,).
+    """
+
+    name: str = string("Name of the surface", is_physics=False)
+    position: Array = array(
+        "Middle of the quarter-chord line from the c.g., body axes", -100, 100, "m", shape=(3,), symbol=r"\mathbf r_s"
+    )
+    dihedral: float = number(
+        "Angle of the span to the horizontal, right tip up: 0 lifts up, 90 is a fin", -180, 180, "deg", symbol=r"\Gamma"
+    )
+    incidence: float = number("Incidence, leading edge up", -90, 90, "deg", symbol="i", default=0.0)
+    area: float = number("Area of the surface", 0, 1e4, "m^2", symbol="S", above_minimum=True)
+    aspect_ratio: float = number("Aspect ratio", 0.1, 100, "1", symbol="A")
+    lift_slope: float | None = number(
+        "Slope of the lift curve; from the aspect ratio by Helmbold where left out", 0.1, 10, "1/rad", default=None
+    )
+    zero_lift_angle: float = number("Angle of attack without lift", -30, 30, "deg", symbol=r"\alpha_0", default=0.0)
+    max_lift: float = number("Largest lift coefficient, at which the surface stalls", 0.05, 4, "1", default=1.0)
+    zero_lift_drag: float = number("Drag coefficient without lift", 0, 2, "1", symbol="C_{D0}", default=0.01)
+    span_efficiency: float = number("Span efficiency in the induced drag", 0.1, 2, "1", symbol="e", default=1.0)
+    dynamic_pressure: float = number(
+        "Dynamic pressure at the surface over that of its motion", 0, 2, "1", symbol=r"\eta", default=1.0
+    )
+    schedule: Schedule = part("Incidence over the airspeed", Schedule, default={})
+    polar: Polar = part("Coefficients over the angle of attack", Polar, default={})
+    wash: Wash = part("Wash of a rotor", Wash, default={})
+
+    @property
+    def slope(self) -> float:
+        """Slope of the lift curve [1/rad]: the given one, or Helmbold's of the aspect ratio (theory.md section 5.8)."""
+        if self.lift_slope is not None:
+            return self.lift_slope
+        ratio = self.aspect_ratio
+        return 2.0 * math.pi * ratio / (2.0 + math.sqrt(ratio * ratio + 4.0))
+
+
+@dataclass(frozen=True, eq=False)
+class AngleTable(ByContent):
+    """One coefficient: the sum of what it is over the angle of attack, over sideslip, and over both."""
+
+    alpha: Array = series("For each angle of attack", -1e6, 1e6, "1")
+    beta: Array = series("For each angle of sideslip", -1e6, 1e6, "1")
+    grid: Array = declared(
+        "For each angle of attack a list of those for each angle of sideslip",
+        list_schema(list_schema(number_schema(-1e6, 1e6), 0, 100), 0, 100),
+        frozen,
+        unit="1",
+        default=[],
+    )
+
+
+def _table(what: str) -> Any:
+    return part(what, AngleTable, default={})
+
+
+@dataclass(frozen=True, eq=False)
+class Fuselage(ByContent):
+    """Fuselage by tables of areas and volumes: force and moment over the dynamic pressure.
+
+    `reference` has the shape (3,).
+    """
+
+    reference: Array = array(
+        "Point from the c.g. to which the tables belong, body axes", -100, 100, "m", shape=(3,), symbol=r"\mathbf r_f"
+    )
+    alpha_deg: Array = series(
+        "Angles of attack of the tables in degrees, from -90 to 90 or -180 to 180", -180, 180, "1"
+    )
+    beta_deg: Array = series("Angles of sideslip of the tables in degrees, from -90 to 90", -90, 90, "1")
+    drag: AngleTable = _table("Drag over the dynamic pressure [m^2]")
+    side: AngleTable = _table("Side force to the right over the dynamic pressure [m^2]")
+    lift: AngleTable = _table("Lift over the dynamic pressure [m^2]")
+    roll: AngleTable = _table("Moment about the flow, right side down, over the dynamic pressure [m^3]")
+    pitch: AngleTable = _table("Moment nose up over the dynamic pressure [m^3]")
+    yaw: AngleTable = _table("Moment nose right over the dynamic pressure [m^3]")
+    wash: Wash = part("Wash of a rotor", Wash, default={})
+
+
+@dataclass(frozen=True, eq=False)
 class Body(ByContent):
     """The whole aircraft, blades included."""
 
@@ -134,6 +260,10 @@ class Body(ByContent):
         symbol="f_x, f_y, f_z",
         model_field="plate_areas",
     )
+    surfaces: tuple[Surface, ...] = parts(
+        f"Lifting surfaces, up to {MAX_SURFACES} of them", Surface, 0, MAX_SURFACES, default=[]
+    )
+    fuselage: Fuselage | None = part("Fuselage by tables, beside the flat plates", Fuselage, default=None)
 
 
 @dataclass(frozen=True)

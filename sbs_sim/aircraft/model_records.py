@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft.declaration import model_values
 from sbs_sim.aircraft.description import Rotor
+from sbs_sim.aircraft.surfaces import parts_of
 from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells
 from sbs_sim.model.elementary import cosine_and_sine
@@ -53,6 +54,7 @@ def model_of(aircraft: "Aircraft") -> R.Model:
         knots=knots,
         table=table,
         stall=_stall(aircraft),
+        **parts_of(aircraft.body, aircraft.rotors)._asdict(),
     )
 
 

@@ -117,8 +117,7 @@ def mirrored(location: Location) -> Location:
 
 def instead_of(location: Location) -> tuple[str, ...]:
     """Paths whose values the one at a location replaces: an altitude those of the air that follow from it."""
-    is_altitude = location[:1] == ("environment",) and location[1] == "altitude"
-    return tuple(f"environment.{key}" for key in GIVEN_AIR) if is_altitude else ()
+    return tuple(f"environment.{key}" for key in GIVEN_AIR) if location == ("environment", "altitude") else ()
 
 
 def without(data: Any, paths: Sequence[str], kept: Mapping[str, Any]) -> Any:
@@ -153,7 +152,7 @@ def unit_of(path: str, record: type = Description) -> str:
     known = units(record)
     if keys[:1] == ("controls",) and keys[-1].endswith("_deg"):
         return "deg"
-    for chosen in (keys, keys[:1] + keys[2:]):  # the second key may be the name of a rotor
+    for chosen in (keys, keys[:1] + keys[2:], keys[:2] + keys[3:]):  # one may be the name of a rotor or surface
         for count in range(len(chosen), 0, -1):
             if chosen[:count] in known:
                 return known[chosen[:count]]

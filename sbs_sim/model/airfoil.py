@@ -414,6 +414,22 @@ def _polynomials(values: Array, interpolation: str) -> Array:
     return np.stack([start, left, 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise])
 
 
+def periodic_cubics(values: Array) -> Array:
+    """Coefficients of x^0 to x^3 of the smooth interpolation, see `cells`, of periodic values at equal steps.
+
+    Parameters
+    ----------
+    values : ndarray, shape (rows, points)
+        The last of a row equals the first.
+
+    Returns
+    -------
+    ndarray, shape (4, rows, points - 1)
+        x is the fraction of a step.
+    """
+    return _polynomials(values, "smooth")
+
+
 def _monotone_slopes(rise: Array) -> Array:
     """Slopes at the beginning of every interval, per interval; the intervals go round the circle.
 

@@ -51,6 +51,7 @@ from sbs_sim.model.inflow import Inflow, disc_flow, inflow_rates
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
 from sbs_sim.model.section import section_loads
+from sbs_sim.model.surfaces import fuselage_load, rotor_wash, surface_load
 from sbs_sim.model.trigonometry import cosine_sine
 
 
@@ -66,6 +67,10 @@ class Aircraft(NamedTuple):
     elements: Any
     knots: Any
     table: Any
+    surfaces: Any
+    fuselages: Any
+    ramps: Any
+    shapes: Any
 
 
 class Memory(NamedTuple):
@@ -139,10 +144,10 @@ def derivative(model, x, swash, psi, wind, work, dx, with_loads):
 @kernel
 def in_lanes(model):
     """A model as records of lanes."""
-    blades = as_records(model.blades)
+    air, blades = as_records(model.air), as_records(model.blades)
     return Aircraft(
         switches=as_records(model.switches),
-        air=as_records(model.air),
+        air=air,
         body=as_records(model.body),
         rotors=as_records(model.rotors),
         blades=blades,
@@ -150,6 +155,10 @@ def in_lanes(model):
         elements=as_records(model.elements),
         knots=as_lanes(model.knots, blades),
         table=model.table,
+        surfaces=as_records(model.surfaces),
+        fuselages=as_records(model.fuselages),
+        ramps=as_lanes(model.ramps, air),
+        shapes=model.shapes,
     )
 
 
@@ -399,7 +408,7 @@ def set_hub_velocities(aircraft, memory, flight):
 
 @kernel
 def body_loads(aircraft, memory, flight):
-    """Loads on the rigid part: fuselage drag, ducts and gyroscopic terms, first part of eq. (5.7)."""
+    """Loads on the rigid part: fuselage, surfaces, ducts and gyroscopic terms, first part of eq. (5.7)."""
     air, body, omega = aircraft.air[0], aircraft.body[0], flight.omega
     drag = plate_drag(air.density, air.plate_areas, flight.air_velocity)
     force = drag - cross(omega, cross(omega, body.first_moment))
@@ -409,7 +418,27 @@ def body_loads(aircraft, memory, flight):
         duct = rotor.axes @ Vector(0.0, 0.0, -duct_thrust(rotor.duct_expansion, memory.totals[j].thrust))
         force = force + duct
         moment = moment + cross(rotor.hub, duct)
+    for i in range(aircraft.surfaces.shape[0]):
+        surface, ramps = aircraft.surfaces[i], aircraft.ramps[i]
+        wash = wash_at(aircraft, memory, surface, ramps)
+        load = surface_load(air.density, surface, ramps, aircraft.shapes, flight.air_velocity, omega, wash)
+        force, moment = force + load.force, moment + load.moment
+    for i in range(aircraft.fuselages.shape[0]):
+        fuselage, ramps = aircraft.fuselages[i], aircraft.ramps[aircraft.surfaces.shape[0] + i]
+        wash = wash_at(aircraft, memory, fuselage, ramps)
+        load = fuselage_load(air.density, fuselage, aircraft.shapes, flight.air_velocity, omega, wash)
+        force, moment = force + load.force, moment + load.moment
     return ForceMoment(force, moment)
+
+
+@kernel
+def wash_at(aircraft, memory, part, ramps):
+    """Velocity relative to the air that the wash of a rotor adds at a surface or fuselage [m/s], body axes."""
+    none = 0.0 * aircraft.air[0].density
+    wash = Vector(none, none, none)
+    if part.rotor >= 0:
+        wash = rotor_wash(part, ramps, aircraft.rotors[part.rotor], memory.flow[part.rotor], memory.state)
+    return wash
 
 
 class Symmetric(NamedTuple):

@@ -37,10 +37,15 @@ def side_by_side(models: Sequence[Model]) -> Model:
     joined: dict[str, Any] = {
         name: _joined([getattr(model, name) for model in models]) for name in Model._fields if name not in SHARED
     }
+    shapes = [model.shapes for model in models]
+    if any(not np.array_equal(shape, shapes[0]) for shape in shapes[1:]):  # as many cells each
+        joined["shapes"] = np.concatenate(shapes)
+        for part in (joined["surfaces"], joined["fuselages"]):
+            part["first_row"] += np.arange(len(models)) * len(shapes[0])
     return first._replace(**joined)
 
 
-SHARED = ("indices", "table")
+SHARED = ("indices", "table", "shapes")
 
 
 def _joined(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:

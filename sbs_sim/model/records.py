@@ -87,6 +87,34 @@ ELEMENT = {
     "lift_factor": LANES,
     "twist": LANES,
 }
+# parts with tables in `shapes`: see `sbs_sim.model.surfaces`
+SURFACE = {
+    "position": VECTOR,  # from the c.g.
+    "down": VECTOR,  # unit vector against the lift
+    "half_area": LANES,  # half of the area, times the factor of the dynamic pressure
+    "incidence": LANES,
+    "wash_down": LANES,  # at the first point of its curve
+    "wash_aft": LANES,
+    "first_alpha": LANES,  # [rad]
+    "inverse_alpha_step": LANES,
+    "alpha_cells": LANES,
+    "first_row": LANES,
+    "rotor": INTEGER,  # whose wash it meets, -1 for none
+    "is_scheduled": INTEGER,
+}
+FUSELAGE = {
+    "position": VECTOR,
+    "wash_down": LANES,
+    "wash_aft": LANES,
+    "first_alpha": LANES,
+    "inverse_alpha_step": LANES,
+    "alpha_cells": LANES,
+    "first_beta": LANES,
+    "inverse_beta_step": LANES,
+    "beta_cells": LANES,
+    "first_row": LANES,
+    "rotor": INTEGER,
+}
 # sums over the blades of a quad, in the order of `sbs_sim.model.dynamics.add_to_sums`
 SUMS = {
     "thrust": LANES,
@@ -204,6 +232,12 @@ class Model(NamedTuple):
     stall : ndarray, shape (registers, 3, k, width)
         Reynolds numbers, increasing, and the highest and lowest angle of attack [rad] at which the airfoil of a blade
         is not stalled; filled up with copies of the last.
+    surfaces, fuselages : structured ndarray, shapes (surfaces,), (fuselages,)
+        Lifting surfaces, and a fuselage with tables or none.
+    ramps : ndarray, shape (surfaces + fuselages, points, 5, n)
+        Their curves of straight lines, see `sbs_sim.model.surfaces`.
+    shapes : ndarray, shape (cells, 16)
+        Their coefficients over angles, as `table`.
     """
 
     switches: NDArray[Any]
@@ -216,6 +250,10 @@ class Model(NamedTuple):
     knots: Array
     table: Array
     stall: Array
+    surfaces: NDArray[Any]
+    fuselages: NDArray[Any]
+    ramps: Array
+    shapes: Array
 
 
 class Work(NamedTuple):

@@ -93,6 +93,9 @@ def schema_keys():
     keys = set(schema)
     for part in ("environment", "body", "options", "controls"):
         keys |= {f"{part}.{key}" for key in schema[part].get("properties", ())}
+    surface, fuselage = schema["body"]["properties"]["surfaces"]["items"], schema["body"]["properties"]["fuselage"]
+    keys |= {f"surfaces.{key}" for key in surface["properties"]} | {f"fuselage.{key}" for key in fuselage["properties"]}
+    keys |= {f"wash.{key}" for key in surface["properties"]["wash"]["properties"]}
     return keys | {f"rotors.{key}" for key in schema["rotors"]["items"]["properties"]}
 
 

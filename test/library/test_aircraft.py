@@ -263,7 +263,7 @@ def schema_leaves(schema, path=()):
 
 
 # in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py
-ELSEWHERE = ("altitude", "temperature_offset")
+ELSEWHERE = ("altitude", "temperature_offset", "surfaces", "fuselage")
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)
@@ -374,7 +374,7 @@ def test_every_key_is_demanded_but_those_with_a_default_and_factors_of_mixing():
 
 # -- what is refused, and how it is said ------------------------------------------------------------
 
-BODY_KEYS = "mass, inertia, flat_plate_areas"
+BODY_KEYS = "mass, inertia, flat_plate_areas, surfaces, fuselage"
 TOO_LONG = "x" * 300
 R0 = ("rotors", 0)
 R1 = ("rotors", 1)
@@ -918,7 +918,7 @@ def test_an_aircraft_of_a_relative_path_can_be_changed_from_elsewhere(tmp_path, 
     assert list(aircraft.with_value("rotors.airfoil", "wing").airfoils) == ["wing"]
 
 
-KEYS_OF_BODY = "unknown key, allowed are mass, inertia, flat_plate_areas"
+KEYS_OF_BODY = "unknown key, allowed are mass, inertia, flat_plate_areas, surfaces, fuselage"
 REFUSED_VALUES = {
     "unknown key": ("body.mas", 1.0, f"body.mas: {KEYS_OF_BODY}"),
     "unknown part": ("bodi.mass", 1.0, "bodi: unknown key, allowed are name, description, environment, "),

@@ -131,7 +131,13 @@ ALLOWED = {
     "sbs_sim.config_file": ["sbs_sim.errors"],
     "sbs_sim.validation": ["sbs_sim.checks"],
     "sbs_sim.aircraft.declaration": [],
-    "sbs_sim.aircraft.description": ["sbs_sim.aircraft.declaration", "sbs_sim.content", "sbs_sim.model"],
+    "sbs_sim.aircraft.atmosphere": ["sbs_sim.model"],
+    "sbs_sim.aircraft.description": [
+        "sbs_sim.aircraft.atmosphere",
+        "sbs_sim.aircraft.declaration",
+        "sbs_sim.content",
+        "sbs_sim.model",
+    ],
     "sbs_sim.aircraft": [
         "sbs_sim.aircraft",
         "sbs_sim.checks",

@@ -59,6 +59,50 @@ TAIL_ROTOR = {
     "flap_spring": 20.0,
     "swashplate_phase_deg": 30.0,
 }
+WASH = {"rotor": "R2", "skew_deg": [-20.0, 30.0, 70.0], "down": [1.8, 1.4, 0.3], "aft": [0.1, 0.4, -0.2]}
+PARTS = {
+    "surfaces": [
+        {
+            "name": "tailplane",
+            "position": [-1.2, 0.05, 0.1],
+            "dihedral_deg": 10.0,
+            "incidence_deg": 3.0,
+            "area": 0.12,
+            "aspect_ratio": 4.0,
+            "zero_lift_angle_deg": -2.0,
+            "span_efficiency": 0.8,
+            "dynamic_pressure": 0.9,
+            "schedule": {"airspeed": [5.0, 15.0, 25.0], "incidence_deg": [30.0, 5.0, -4.0]},
+            "wash": WASH,
+        },
+        {"name": "fin", "position": [-1.3, 0.0, -0.2], "dihedral_deg": 90.0, "area": 0.08, "aspect_ratio": 1.5},
+        {
+            "name": "by polar",
+            "position": [0.1, 0.4, 0.0],
+            "dihedral_deg": -150.0,
+            "area": 0.05,
+            "aspect_ratio": 6.0,
+            "polar": {
+                "angle_deg": [-90.0, -20.0, -10.0, 0.0, 12.5, 30.0, 90.0],
+                "lift": [0.0, -0.7, -0.9, 0.05, 1.0, 0.9, 0.0],
+                "drag": [1.2, 0.4, 0.05, 0.01, 0.06, 0.5, 1.1],
+            },
+            "wash": {"rotor": "R1", "down": [0.5]},
+        },
+    ],
+    "fuselage": {
+        "reference": [0.1, 0.02, 0.2],
+        "alpha_deg": [-90.0, -30.0, -10.0, 0.0, 20.0, 90.0],
+        "beta_deg": [-90.0, -20.0, 0.0, 30.0, 90.0],
+        "drag": {"alpha": [0.5, 0.2, 0.1, 0.1, 0.15, 0.6], "beta": [0.3, 0.1, 0.0, 0.1, 0.3]},
+        "side": {"beta": [0.1, 0.3, 0.0, -0.3, -0.1]},
+        "lift": {"alpha": [0.0, -0.1, -0.04, 0.01, 0.1, 0.0]},
+        "roll": {"beta": [0.0, 0.02, 0.0, -0.02, 0.0]},
+        "pitch": {"alpha": [-0.1, -0.2, -0.1, 0.0, 0.15, 0.1]},
+        "yaw": {"grid": [[0.1 * a - 0.03 * b * b for b in range(5)] for a in range(6)]},
+        "wash": {**WASH, "rotor": "R1"},
+    },
+}
 AIRCRAFT = {
     "sbs": {},
     "sbs_paper": {"name": "sbs_paper"},
@@ -84,6 +128,8 @@ AIRCRAFT = {
     "two_airfoils": {"rotors": [{"airfoil": "linear_573"}, {"airfoil": "naca0012"}]},
     "central_hinges": {"every_rotor": {"hinge_offset": 0.0, "flap_hinge_offset": 0.0}},
     "vacuum": {"environment": {"air_density": 0.0}, "every_rotor": ODD_BLADE},
+    "surfaces_and_fuselage": {"body": PARTS, "rotors": TILTED},
+    "surfaces_and_paper_coupling": {"name": "sbs_paper", "body": PARTS},
 }
 SWITCHES = [(True, True), (False, True), (True, False), (False, False)]
 

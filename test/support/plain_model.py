@@ -22,6 +22,7 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
+from plain_parts import part_loads
 from scipy.interpolate import CubicHermiteSpline
 
 #: Smooth floor of the inflow's total velocity V_T, in units of the tip speed (theory.md section 6).
@@ -532,7 +533,8 @@ class Instant(NamedTuple):
     body_mass: tuple  # mass, first moment, inertia of `body_mass`
     gravity: np.ndarray  # body axes [m/s^2]
     body_rate: np.ndarray  # [rad/s]
-    fuselage_force: np.ndarray  # aerodynamic, at the origin [N]
+    fuselage_force: np.ndarray  # aerodynamic, of plates, surfaces and tables [N]
+    fuselage_moment: np.ndarray  # about the origin [N m]
     blades: list  # over rotors of lists of Blade
     air_loads: list  # over rotors, over blades, of lists of (s, force)
 
@@ -654,7 +656,7 @@ def residual(instant, unknowns):
     force = instant.fuselage_force + mass * (g - origin_acceleration)
     force = force - cross(body_rate_dot, about_origin) - cross(om, cross(om, about_origin))
     moment = cross(about_origin, g - origin_acceleration) - inertia @ body_rate_dot
-    moment = moment - cross(om, inertia @ om)
+    moment = moment - cross(om, inertia @ om) + instant.fuselage_moment
     hinges = []
     for j, rotor in enumerate(ac.rotors):
         hub_force, hub_moment = hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd[j], lag_dd[j])
@@ -688,6 +690,7 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
     attitude = rotation_matrix(state.quaternion)
     air_velocity = state.velocity - attitude.T @ np.asarray(wind, dtype=float)
     blades = make_blades(ac, state, psi)
+    part_force, part_moment = part_loads(ac, air_velocity, state.rate, state.inflow)
     air_loads = []
     for j, rotor in enumerate(ac.rotors):
         air_velocity_hub = air_velocity + cross(state.rate, np.asarray(rotor.hub, dtype=float))
@@ -700,7 +703,8 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
         body_mass=body_mass(ac),
         gravity=attitude.T @ np.array([0.0, 0.0, ac.environment.gravity]),
         body_rate=state.rate,
-        fuselage_force=flat_plate_force(ac, air_velocity),
+        fuselage_force=flat_plate_force(ac, air_velocity) + part_force,
+        fuselage_moment=part_moment,
         blades=blades,
         air_loads=air_loads,
     )

@@ -112,9 +112,14 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
             f"< {length:g}, from the flap hinge to the tip",
         ),
         (
-            rotor.blade_cg <= length / math.sqrt(3) or length <= 0,
+            rotor.blade_inertia is not None or rotor.blade_cg <= length / math.sqrt(3) or length <= 0,
             "blade_cg",
             f"<= {length / math.sqrt(3):.6g}, L/sqrt(3): the blade's second moment is m_b L^2/3",
+        ),
+        (
+            rotor.blade_inertia is None or rotor.blade_inertia >= rotor.first_moment * rotor.blade_cg,
+            "blade_inertia",
+            f">= {rotor.first_moment * rotor.blade_cg:.6g}, blade_mass blade_cg^2",
         ),
     ]
     problems = [

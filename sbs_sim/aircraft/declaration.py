@@ -53,6 +53,7 @@ class Declaration:
         LaTeX, as in the table of symbols of docs/theory.md; several with ", " between them.
     default : object
         What counts where the file leaves the key out, in the unit of the file; REQUIRED for a key that each file needs.
+        None where nothing counts: the attribute is None, and other values take its place.
     is_physics : bool
         The value counts in `Aircraft.parameter_hash`.
     model_field : str
@@ -91,13 +92,13 @@ class Declaration:
     def full_schema(self) -> dict[str, Any]:
         """JSON schema with the default and the description, which ends with the unit."""
         unit = f" [{self.unit}]" if self.unit not in ("", "1") else ""
-        default = {} if self.is_required else {"default": self.default}
+        default = {} if self.default in (REQUIRED, None) else {"default": self.default}
         return {**self.schema, **default, "description": f"{self.text}{unit}"}
 
     @property
     def internal_default(self) -> Any:
         """Internal value of the default; REQUIRED for a key that each file needs."""
-        return REQUIRED if self.is_required else self.read(self.default)
+        return self.default if self.default in (REQUIRED, None) else self.read(self.default)
 
     def read_from(self, data: Mapping[str, Any]) -> Any:
         """Internal value from the checked mapping of the part."""

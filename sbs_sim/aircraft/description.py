@@ -153,6 +153,14 @@ class Rotor(ByContent):
     blades: int = integer("Number of blades", 3, 20, symbol="N_b")
     blade_mass: float = number("Mass of a blade", 1e-12, 1e4, "kg", symbol="m_b", model_field="mass")
     blade_cg: float = number("Distance of a blade's c.g. from the flap hinge", 1e-12, 50, "m", symbol="r_G")
+    blade_inertia: float | None = number(
+        "Second moment of a blade about the flap hinge; of a uniform blade by options.flap_inertia if left out",
+        1e-12,
+        1e9,
+        "kg m^2",
+        symbol="A_1",
+        default=None,
+    )
     hinge_offset: float = number(
         "Distance of the flap hinge from the axis", 0, 50, "m", symbol="e_0", model_field="hinge_offset"
     )
@@ -216,7 +224,9 @@ class Rotor(ByContent):
 
     @property
     def second_moment(self) -> float:
-        """A1 of a blade about its flap hinge, m_b L^2 / 3 [kg m^2]."""
+        """A1 of a blade about its flap hinge, m_b L^2 / 3 unless the file has it [kg m^2]."""
+        if self.blade_inertia is not None:
+            return self.blade_inertia
         return self.blade_mass * (self.blade_length * self.blade_length) / 3
 
     def elements(self, count: int) -> Array:

@@ -110,7 +110,7 @@ def _body(aircraft: "Aircraft") -> NDArray[Any]:
 
 def second_moment(aircraft: "Aircraft", rotor: Rotor) -> float:
     """A_1 in the equations of a blade [kg m^2]."""
-    to_axis = aircraft.options.flap_inertia == "axis_to_tip"
+    to_axis = aircraft.options.flap_inertia == "axis_to_tip" and rotor.blade_inertia is None
     return rotor.blade_mass * (rotor.radius * rotor.radius) / 3 if to_axis else rotor.second_moment
 
 

@@ -222,6 +222,36 @@ def test_fuselage_and_turning_blades_make_up_the_aircraft():
     np.testing.assert_allclose(inertia, aircraft.body.inertia, atol=1e-13)
 
 
+def test_mass_first_moment_and_inertia_of_a_blade_are_independent(sbs):
+    """UH-60A after Howlett, NASA CR-166309: no uniform blade has these three."""
+    blade = {"mass": 116.527879853, "first_moment": 385.66081570248, "inertia": 2050.8103068}
+    rotor = dataclasses.replace(
+        sbs.rotors[0],
+        radius=8.177784,
+        hinge_offset=0.381,
+        flap_hinge_offset=0.0,
+        flap_spring=0.0,
+        blade_mass=blade["mass"],
+        blade_cg=blade["first_moment"] / blade["mass"],
+        blade_inertia=blade["inertia"],
+    )
+    assert (rotor.first_moment, rotor.second_moment) == pytest.approx((blade["first_moment"], blade["inertia"]))
+    # 1 + e S / I = 1.07165 as in the report; its lag frequency is the root of the second part
+    assert 1 + rotor.hinge_offset * rotor.first_moment / rotor.second_moment == pytest.approx(1.07165, abs=5e-6)
+    uniform = dataclasses.replace(rotor, blade_inertia=None).second_moment
+    assert uniform == pytest.approx(116.527879853 * 7.796784**2 / 3)
+
+
+def test_a_given_inertia_counts_in_every_reading(sbs_paper):
+    """It takes the place of both choices of options.flap_inertia, in the equations and in the hub loads."""
+    assert sbs_paper.options.flap_inertia == "axis_to_tip"
+    given = sbs_paper.with_value("rotors.blade_inertia", 0.0123)
+    blade = given.model().blades[0]
+    assert blade["second_moment"][0] == blade["hub_second_moment"][0] == 0.0123
+    assert given.with_value("options.flap_inertia", "hinge_to_tip").model().blades[0]["second_moment"][0] == 0.0123
+    assert given.parameter_hash != sbs_paper.parameter_hash
+
+
 @pytest.mark.parametrize("count", [1, 7, 20])
 def test_elements_cover_the_blade(sbs, count):
     rotor = dataclasses.replace(
@@ -276,9 +306,15 @@ OTHER_VALUES = {
     ("rotors", 0, "blades"): 4,
     ("rotors", 0, "shaft_direction"): [0.1, 0.2, -0.9],
     ("rotors", 0, "lag_spring"): 3.0,
+    ("rotors", 0, "blade_inertia"): 0.0123,
     ("options", "elements"): 21,
 }
-OPTIONAL = {"speed_of_sound", "interpolation", "swashplate_offset_deg"}
+OPTIONAL = {
+    "speed_of_sound",
+    "interpolation",
+    "swashplate_offset_deg",
+    "blade_inertia",
+}
 NOT_IN_THE_MODEL = {
     "name",
     "description",
@@ -347,7 +383,7 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
         value = get(data, path)
     except KeyError:
         value = None
-        assert path[:3] == ("rotors", 0, "mixing") or path[2] in OPTIONAL, "a key that sbs.yaml does not show"
+        assert path[:3] == ("rotors", 0, "mixing") or OPTIONAL & set(path), "a key that sbs.yaml does not show"
     put(data, path, other_value(path, value))
     aircraft = Aircraft.from_dict(data)
     assert flattened(aircraft) != everything
@@ -472,6 +508,11 @@ REFUSED = {
         (*R0, "blade_cg"),
         0.25,
         "rotors[0].blade_cg = 0.25: allowed is <= 0.248261, L/sqrt(3): the blade's second moment is m_b L^2/3",
+    ),
+    "inertia less than that of a point mass": (
+        (*R0, "blade_inertia"),
+        0.008,
+        "rotors[0].blade_inertia = 0.008: allowed is >= 0.00809339, blade_mass blade_cg^2",
     ),
     "no rotors": (("rotors",), [], "rotors = []: allowed is a list of at least 1"),
     "sense of rotation": ((*R0, "rotation"), 2, "rotors[0].rotation = 2: allowed is one of 1, -1"),

@@ -33,6 +33,7 @@ from sbs_sim.model.multiblade import blade_matrix
 ODD_BLADE = {
     "hinge_offset": 0.09,
     "flap_hinge_offset": 0.035,
+    "blade_inertia": 0.0121,  # a uniform blade has 0.0093
     "lag_spring": 25.0,
     "lag_damping": 0.4,
     "pitch_flap_coupling": 0.3,

@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import sympy as sp
+from plain_model import flap_inertia
 
 
 def _cross_matrix(vector):
@@ -92,7 +93,7 @@ def blade_accelerations(
     elements : iterable of (float, array of shape (3,))
         Stations from the flap hinge [m] and external forces there [N], body axes.
     second_moment : float, optional
-        In place of A1 = m_b L^2 / 3 [kg m^2].
+        In place of A1 of the rotor [kg m^2].
     lead_lag : bool
         Off: xi'' is zero as a constraint.
 
@@ -100,8 +101,7 @@ def blade_accelerations(
     -------
     tuple of two floats
     """
-    length = rotor.radius - rotor.hinge_offset
-    inertia = rotor.blade_mass * length**2 / 3 if second_moment is None else second_moment
+    inertia = flap_inertia(rotor) if second_moment is None else second_moment
     mass, force, *jacobians = _equations()(
         *angles,
         *rates,

@@ -154,6 +154,13 @@ def split_state(ac, x, lead_lag=True, cyclic_inflow=True):
 # ------------------------------------------------------------------------------------------------------------
 
 
+def flap_inertia(rotor, length=None):
+    """Return A1 [kg m^2]: that of the file, or of a uniform blade of a length [m], by default from the flap hinge."""
+    if rotor.blade_inertia is not None:
+        return rotor.blade_inertia
+    return rotor.blade_mass * (rotor.radius - rotor.hinge_offset if length is None else length) ** 2 / 3
+
+
 def mass_points(rotor, second_moment=None):
     """Return three point masses that carry a blade's m_b, S1 and A1.
 
@@ -172,7 +179,7 @@ def mass_points(rotor, second_moment=None):
     """
     length = rotor.radius - rotor.hinge_offset
     if second_moment is None:
-        second_moment = rotor.blade_mass * length**2 / 3
+        second_moment = flap_inertia(rotor)
     stations = np.array([0.0, length / 2, length])
     integrals = [rotor.blade_mass, rotor.blade_mass * rotor.blade_cg, second_moment]
     masses = np.linalg.solve(np.vander(stations, increasing=True).T, integrals)
@@ -578,7 +585,6 @@ def hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd, lag_dd):
     ac, rotor = instant.ac, instant.ac.rotors[j]
     hub_acceleration, alpha = hub_motion(instant, rotor, origin_acceleration, body_rate_dot)
     weight = np.zeros(3) if ac.options.coupling == "paper" else instant.gravity
-    length = rotor.radius - rotor.hinge_offset
     force, moment, paper_moment = np.zeros(3), np.zeros(3), np.zeros(3)
     for k, blade in enumerate(instant.blades[j]):
         for s, element_force in instant.air_loads[j][k]:
@@ -591,7 +597,7 @@ def hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd, lag_dd):
             moment += cross(blade.position(s), point_mass * (weight - a))
         paper_moment += rotor.flap_spring * blade.flap * blade.f
         if instant.lead_lag:
-            paper_moment -= rotor.blade_mass * length**2 / 3 * flap_dd[k] * blade.f
+            paper_moment -= flap_inertia(rotor) * flap_dd[k] * blade.f
     if ac.options.hub_moment == "paper":
         u = np.asarray(rotor.shaft_direction, dtype=float)
         moment = paper_moment - u * (u @ paper_moment) + u * (u @ moment)
@@ -618,7 +624,7 @@ def hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, 
     """
     ac, rotor, blade = instant.ac, instant.ac.rotors[j], instant.blades[j][k]
     hub_acceleration, alpha = hub_motion(instant, rotor, origin_acceleration, body_rate_dot)
-    inertia = rotor.blade_mass * rotor.radius**2 / 3 if ac.options.flap_inertia == "axis_to_tip" else None
+    inertia = flap_inertia(rotor, rotor.radius) if ac.options.flap_inertia == "axis_to_tip" else None
     loads = list(instant.air_loads[j][k])
     for s, point_mass in mass_points(rotor, inertia):
         a = blade.acceleration(s, hub_acceleration, alpha, flap_dd, lag_dd)
@@ -899,6 +905,7 @@ def table6_aircraft(environment=None, body=None, options=None, rotors=None):
         "blades": 3,
         "blade_mass": 0.1613,
         "blade_cg": 0.224,
+        "blade_inertia": None,
         "hinge_offset": 0.075,
         "flap_hinge_offset": 0.0075,
         "flap_spring": 162.0,

@@ -173,6 +173,24 @@ class Rotor(ByContent):
     lag_spring: float = number(
         "Stiffness of the lag hinge", 0, 1e9, "N m/rad", symbol=r"K_\xi", model_field="lag_spring"
     )
+    flap_rest: float = number(
+        "Flap angle at which the flap spring exerts no moment: the precone of a hingeless blade",
+        -45,
+        45,
+        "deg",
+        symbol=r"\beta_0",
+        model_field="flap_rest",
+        default=0.0,
+    )
+    lag_rest: float = number(
+        "Lag angle at which the lag spring exerts no moment",
+        -45,
+        45,
+        "deg",
+        symbol=r"\xi_0",
+        model_field="lag_rest",
+        default=0.0,
+    )
     lag_damping: float = number(
         "Damping of the lag hinge", 0, 1e9, "N m s/rad", symbol=r"C_\xi", model_field="lag_damping"
     )

@@ -132,7 +132,8 @@ class MomentumRotor:
         spring = rotor.hinge_offset * rotor.first_moment * omega2 + rotor.flap_spring
         self._coning_stiffness = rotor.blades * (second_moment * omega2 + spring)
         self._tilt_stiffness = rotor.blades * spring
-        self._droop = rotor.blades * rotor.first_moment * gravity * float(self._axes[2, 2])
+        weight = rotor.first_moment * gravity * float(self._axes[2, 2])
+        self._droop = rotor.blades * (weight - rotor.flap_spring * rotor.flap_rest)
         pull = rotor.blade_mass * rotor.flap_hinge_offset + rotor.first_moment
         lag_offset = rotor.hinge_offset - rotor.flap_hinge_offset
         self._lag_stiffness = rotor.blades * (rotor.lag_spring + lag_offset * pull * omega2)

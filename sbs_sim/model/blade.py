@@ -199,7 +199,7 @@ def hinge_moments(blade, basis, pose, loads, a_0, a_s):
     k2 = e_f * blade.first_moment + cos_flap * blade.second_moment
     flap = (
         loads.normal_moment
-        - blade.flap_spring * pose.beta
+        - blade.flap_spring * (pose.beta - blade.flap_rest)
         - blade.first_moment * dot(basis.normal, a_0)
         - blade.second_moment * dot(basis.normal, a_s)
     )
@@ -207,7 +207,7 @@ def hinge_moments(blade, basis, pose, loads, a_0, a_s):
         k1 * a_0.y
         + k2 * a_s.y
         - (e_f * loads.forward_force + cos_flap * loads.forward_moment)
-        - blade.lag_spring * pose.xi
+        - blade.lag_spring * (pose.xi - blade.lag_rest)
         - blade.lag_damping * pose.xi_rate
     )
     lag_inertia = e_f * (k1 + cos_flap * blade.first_moment) + cos_flap * cos_flap * blade.second_moment
@@ -287,7 +287,7 @@ def paper_moment(blade, basis, pose, loads):
     hinge = basis.lag_hinge + basis.flap_hinge
     moment = Vector(
         hinge.y * lift - basis.span.z * loads.forward_moment,
-        -(hinge.x * lift) - loads.normal_moment - blade.flap_spring * pose.beta,
+        -(hinge.x * lift) - loads.normal_moment - blade.flap_spring * (pose.beta - blade.flap_rest),
         ZERO,
     )
     flap_axis = Vector(ZERO, -1.0, ZERO)

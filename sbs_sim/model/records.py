@@ -60,6 +60,8 @@ BLADE = {
     "inverse_second_moment": LANES,  # 0 for what fills up a quad
     "flap_spring": LANES,
     "lag_spring": LANES,
+    "flap_rest": LANES,  # angles at which the springs exert no moment
+    "lag_rest": LANES,
     "lag_damping": LANES,
     "pitch_flap_coupling": LANES,
     "pitch_lag_coupling": LANES,

@@ -307,6 +307,8 @@ OTHER_VALUES = {
     ("rotors", 0, "shaft_direction"): [0.1, 0.2, -0.9],
     ("rotors", 0, "lag_spring"): 3.0,
     ("rotors", 0, "blade_inertia"): 0.0123,
+    ("rotors", 0, "flap_rest_deg"): 2.0,
+    ("rotors", 0, "lag_rest_deg"): -7.0,
     ("options", "elements"): 21,
 }
 OPTIONAL = {
@@ -314,6 +316,8 @@ OPTIONAL = {
     "interpolation",
     "swashplate_offset_deg",
     "blade_inertia",
+    "flap_rest_deg",
+    "lag_rest_deg",
 }
 NOT_IN_THE_MODEL = {
     "name",

@@ -24,6 +24,8 @@ def odd_aircraft(rng, blades=3, **options):
             "flap_hinge_offset": 0.035,
             "blade_inertia": [0.0121, None],
             "lag_spring": 25.0,
+            "flap_rest": 0.05,
+            "lag_rest": [-0.12, 0.08],
             "lag_damping": 0.4,
             "pitch_flap_coupling": 0.3,
             "pitch_lag_coupling": -0.2,

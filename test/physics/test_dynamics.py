@@ -23,6 +23,7 @@ from helpers import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_model import multiblade_matrix, plain_derivative, random_state
+from scipy.optimize import brentq
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.model import records as R
@@ -35,6 +36,8 @@ ODD_BLADE = {
     "flap_hinge_offset": 0.035,
     "blade_inertia": 0.0121,  # a uniform blade has 0.0093
     "lag_spring": 25.0,
+    "flap_rest_deg": 2.5,
+    "lag_rest_deg": -7.0,
     "lag_damping": 0.4,
     "pitch_flap_coupling": 0.3,
     "pitch_lag_coupling": -0.2,
@@ -312,6 +315,32 @@ def test_lag_frequencies_in_vacuum(blades, lag_spring):
     # the torque on a body of 1e6 kg m^2 turns it a little: 1e-7
     np.testing.assert_allclose(found.imag, seen_from_the_body(frequency, blades), rtol=1e-5)
     np.testing.assert_allclose(found.real, 0, atol=1e-6)
+
+
+def test_springs_hold_blades_at_their_rest_angles():
+    """Vacuum: the centrifugal moments (e_0 S1 + A1 cos b) Omega^2 sin b and e_L k1 Omega^2 sin x hold the springs."""
+    model = Model(stand(flap_rest_deg=3.0, lag_rest_deg=-7.0, lag_spring=60.0, flap_hinge_offset=0.04))
+    rotor = model.aircraft.rotors[0]
+    s1, a1, _ = inertias(rotor)
+    e_f, e_l = rotor.flap_hinge_offset, rotor.hinge_offset - rotor.flap_hinge_offset
+    x, flap = model.state(), 0.0
+    for _ in range(60):  # flap and lag hang together by the cosines of both
+        stiffness = rotor.speed**2 * e_l * (rotor.blade_mass * e_f + s1 * np.cos(flap))
+        lag = brentq(lambda y, pull: rotor.lag_spring * (rotor.lag_rest - y) - pull * np.sin(y), -0.2, 0, (stiffness,))
+        arm = s1 * (e_l * np.cos(lag) + e_f)
+        flap = brentq(
+            lambda b, arm: rotor.flap_spring * (rotor.flap_rest - b)
+            - rotor.speed**2 * np.sin(b) * (a1 * np.cos(b) + arm),
+            0,
+            0.1,
+            (arm,),
+        )
+    x[model.layout.flap(0).start], x[model.layout.lag(0).start] = flap, lag
+    share = rotor.flap_spring / (a1 * (rotor.speed * flap_frequency(rotor)) ** 2)  # for small angles
+    assert flap == pytest.approx(share * rotor.flap_rest, rel=1e-2)
+    rates = model.derivative(x)
+    for part in (model.layout.flap_rate(0), model.layout.lag_rate(0)):
+        np.testing.assert_allclose(rates[part] / rotor.speed**2, 0.0, atol=1e-8)
 
 
 def test_lag_damper_damps_every_lag_mode():

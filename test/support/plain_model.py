@@ -595,7 +595,7 @@ def hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd, lag_dd):
             a = blade.acceleration(s, hub_acceleration, alpha, flap_dd[k], lag_dd[k])
             force += point_mass * (weight - a)
             moment += cross(blade.position(s), point_mass * (weight - a))
-        paper_moment += rotor.flap_spring * blade.flap * blade.f
+        paper_moment += rotor.flap_spring * (blade.flap - rotor.flap_rest) * blade.f
         if instant.lead_lag:
             paper_moment -= flap_inertia(rotor) * flap_dd[k] * blade.f
     if ac.options.hub_moment == "paper":
@@ -633,9 +633,9 @@ def hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, 
     for s, load in loads:
         about_flap += cross(s * blade.d, load)
         about_lag += cross(blade.flap_arm + s * blade.d, load)
-    flap = blade.f @ about_flap - rotor.flap_spring * blade.flap
-    lag = -rotor.rotation * blade.u @ about_lag - rotor.lag_spring * blade.lag - rotor.lag_damping * blade.lag_rate
-    return flap, lag
+    flap = blade.f @ about_flap - rotor.flap_spring * (blade.flap - rotor.flap_rest)
+    lag = -rotor.rotation * blade.u @ about_lag - rotor.lag_spring * (blade.lag - rotor.lag_rest)
+    return flap, lag - rotor.lag_damping * blade.lag_rate
 
 
 def residual(instant, unknowns):
@@ -864,7 +864,8 @@ def energy(ac, x, psi):
         total = total + 0.5 * point_mass * velocity @ velocity
     for rotor, blades in zip(ac.rotors, make_blades(ac, state, psi), strict=True):
         for blade in blades:
-            total = total + 0.5 * (rotor.flap_spring * blade.flap**2 + rotor.lag_spring * blade.lag**2)
+            flap, lag = blade.flap - rotor.flap_rest, blade.lag - rotor.lag_rest
+            total = total + 0.5 * (rotor.flap_spring * flap**2 + rotor.lag_spring * lag**2)
     return total - ac.environment.gravity * first_moment(ac, x, psi)[2]
 
 
@@ -910,6 +911,8 @@ def table6_aircraft(environment=None, body=None, options=None, rotors=None):
         "flap_hinge_offset": 0.0075,
         "flap_spring": 162.0,
         "lag_spring": 0.0,
+        "flap_rest": 0.0,
+        "lag_rest": 0.0,
         "lag_damping": 0.0,
         "pitch_flap_coupling": 0.0,
         "pitch_lag_coupling": 0.0,

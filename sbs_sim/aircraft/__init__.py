@@ -188,6 +188,11 @@ class Aircraft(Description):
         return StateLayout(tuple(rotor.blades for rotor in self.rotors))
 
     @cached_property
+    def passages(self) -> tuple[int, ...]:
+        """How often each rotor is the same again in one revolution: with every blade, or once if its blades differ."""
+        return tuple(rotor.blades if rotor.has_equal_blades else 1 for rotor in self.rotors)
+
+    @cached_property
     def parameter_hash(self) -> str:
         """SHA-256 over everything that the model takes from the aircraft file: equal for equal physics.
 

@@ -17,6 +17,7 @@ RESERVED_NAMES = frozenset(
     {*EULER_NAMES, *SWASHPLATE_NAMES, "time", "thrust", "torque", "power", "state", "controls", "swashplate", "pitch"}
     | {"roll", "heading", "airspeed", "climb_rate", "turn_rate", "residual", "acceleration", "warnings"}
 ) - {*CONTROL_NAMES}
+MIN_LENGTH = 1e-6  # m, of a damper
 
 
 def consistency_problems(aircraft: "Aircraft") -> list[str]:
@@ -122,11 +123,23 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
             f">= {rotor.first_moment * rotor.blade_cg:.6g}, blade_mass blade_cg^2",
         ),
     ]
+    factors = rotor.lag_damping_factors
+    relations += [
+        (len(factors) == rotor.blades, "blade_lag_damping", f"a list of {rotor.blades}, one of each blade"),
+    ]
     problems = [
         f"{key} = {_plain(getattr(rotor, key))}: allowed is {text}" for is_met, key, text in relations if not is_met
     ]
+    if rotor.damper_damping > 0.0 and _damper_length(rotor) < MIN_LENGTH:
+        allowed = "0 where both ends of the damper are in one place"
+        problems.append(f"lag_damper.damping = {rotor.damper_damping}: allowed is {allowed}")
     problems += _range_problems("collective_range_deg", rotor.collective_range)
     return problems + _range_problems("cyclic_range_deg", rotor.cyclic_range)
+
+
+def _damper_length(rotor: Rotor) -> float:
+    """Length of the axial lag damper without flap and pitch, at the rest angle of lag [m], eq. (3.7)."""
+    return math.hypot(rotor.damper_b + rotor.damper_c, rotor.damper_d - rotor.damper_r, rotor.damper_a)
 
 
 def _plain(value: Any) -> str:

@@ -37,6 +37,7 @@ Range = tuple[float, float]
 MAX_ROTORS, MAX_CONTROLS = 16, 16
 MAX_CONTROL = 1e6  # of a control that is no angle, in its unit
 TRIMMED_CONTROLS = 4  # that a trim finds
+MAX_BLADES = 20
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,7 @@ class Rotor(ByContent):
     )
     speed: float = number("Rotor speed", 1, 100000, "rpm", symbol=r"\Omega", model_field="rotor_speed")
     radius: float = number("Rotor radius", 0.01, 50, "m", symbol="R", model_field="radius")
-    blades: int = integer("Number of blades", 3, 20, symbol="N_b")
+    blades: int = integer("Number of blades", 3, MAX_BLADES, symbol="N_b")
     blade_mass: float = number("Mass of a blade", 1e-12, 1e4, "kg", symbol="m_b", model_field="mass")
     blade_cg: float = number("Distance of a blade's c.g. from the flap hinge", 1e-12, 50, "m", symbol="r_G")
     blade_inertia: float | None = number(
@@ -193,6 +194,73 @@ class Rotor(ByContent):
     )
     lag_damping: float = number(
         "Damping of the lag hinge", 0, 1e9, "N m s/rad", symbol=r"C_\xi", model_field="lag_damping"
+    )
+    blade_lag_damping: Array | None = declared(
+        "Factor on the lag damping of each blade, the first blade first; all 1 if left out",
+        list_schema(number_schema(0, 100), 1, MAX_BLADES),
+        frozen,
+        unit="1",
+        default=None,
+    )
+    damper_damping: float = number(
+        "Force of an axial lag damper over its rate",
+        0,
+        1e9,
+        "N s/m",
+        key="lag_damper.damping",
+        symbol="C_d",
+        model_field="damper_damping",
+        default=0.0,
+    )
+    damper_a: float = number(
+        "Linkage of the axial lag damper: its end on the blade, above the blade's axis, at zero flap",
+        -50,
+        50,
+        "m",
+        key="lag_damper.a",
+        symbol=r"h_a",
+        model_field="damper_a",
+        default=0.0,
+    )
+    damper_b: float = number(
+        "Linkage: the same end, along the span from the hinges at the rest angle of lag",
+        -50,
+        50,
+        "m",
+        key="lag_damper.b",
+        symbol=r"h_b",
+        model_field="damper_b",
+        default=0.0,
+    )
+    damper_c: float = number(
+        "Linkage: its end on the hub, inboard of the hinges",
+        -50,
+        50,
+        "m",
+        key="lag_damper.c",
+        symbol=r"h_c",
+        model_field="damper_c",
+        default=0.0,
+    )
+    damper_d: float = number(
+        "Linkage: its end on the blade, ahead of the hinges against lag",
+        -50,
+        50,
+        "m",
+        key="lag_damper.d",
+        symbol=r"h_d",
+        model_field="damper_d",
+        default=0.0,
+    )
+    damper_r: float = number(
+        "Linkage: lever of the end on the hub, which turns with the pitch",
+        -50,
+        50,
+        "m",
+        key="lag_damper.r",
+        symbol=r"h_r",
+        model_field="damper_r",
+        default=0.0,
     )
     pitch_flap_coupling: float = number(
         "Blade pitch taken off per flap angle",
@@ -246,6 +314,16 @@ class Rotor(ByContent):
         if self.blade_inertia is not None:
             return self.blade_inertia
         return self.blade_mass * (self.blade_length * self.blade_length) / 3
+
+    @property
+    def lag_damping_factors(self) -> Array:
+        """Factor on the lag damping of each blade, shape (blades,)."""
+        return np.ones(self.blades) if self.blade_lag_damping is None else self.blade_lag_damping
+
+    @property
+    def has_equal_blades(self) -> bool:
+        """All blades are alike, so that the rotor is the same again after the passage of one."""
+        return bool(np.all(self.lag_damping_factors == self.lag_damping_factors[0]))
 
     def elements(self, count: int) -> Array:
         """Blade elements at their mid-points (theory.md section 4).

@@ -89,6 +89,7 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches = R.records(R.SWITCHES, 1, 1)
     switches["lead_lag"] = switches["cyclic_inflow"] = 1
     switches["complete_coupling"] = aircraft.options.coupling == "complete"
+    switches["axial_dampers"] = any(rotor.damper_damping > 0.0 for rotor in aircraft.rotors)
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
     return switches
 
@@ -121,9 +122,11 @@ def _blade_values(
     columns, first_angle, inverse_step = cell_grid(airfoil)
     cos_phase, sin_phase = cosine_and_sine(rotor.swashplate_phase)
     cos_azimuth_offset, sin_azimuth_offset = cosine_and_sine(2.0 * math.pi * number / rotor.blades)
-    inertia = second_moment(aircraft, rotor)
+    inertia, factor = second_moment(aircraft, rotor), float(rotor.lag_damping_factors[number])
     return {
         **model_values(rotor, R.BLADE),
+        "lag_damping": factor * rotor.lag_damping,
+        "damper_damping": factor * rotor.damper_damping,
         "axes": hub_axes(rotor.shaft_direction),
         "lag_hinge_offset": rotor.hinge_offset - rotor.flap_hinge_offset,
         "first_moment": rotor.first_moment,

@@ -307,6 +307,7 @@ OTHER_VALUES = {
     ("rotors", 0, "shaft_direction"): [0.1, 0.2, -0.9],
     ("rotors", 0, "lag_spring"): 3.0,
     ("rotors", 0, "blade_inertia"): 0.0123,
+    ("rotors", 0, "blade_lag_damping"): [1.0, 0.0, 1.0],
     ("rotors", 0, "flap_rest_deg"): 2.0,
     ("rotors", 0, "lag_rest_deg"): -7.0,
     ("options", "elements"): 21,
@@ -318,6 +319,8 @@ OPTIONAL = {
     "blade_inertia",
     "flap_rest_deg",
     "lag_rest_deg",
+    "blade_lag_damping",
+    "lag_damper",
 }
 NOT_IN_THE_MODEL = {
     "name",
@@ -388,6 +391,8 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
     except KeyError:
         value = None
         assert path[:3] == ("rotors", 0, "mixing") or OPTIONAL & set(path), "a key that sbs.yaml does not show"
+    if path[2:3] == ("lag_damper",):
+        data["rotors"][0]["lag_damper"] = {"c": 0.02, "d": 0.03}
     put(data, path, other_value(path, value))
     aircraft = Aircraft.from_dict(data)
     assert flattened(aircraft) != everything
@@ -517,6 +522,16 @@ REFUSED = {
         (*R0, "blade_inertia"),
         0.008,
         "rotors[0].blade_inertia = 0.008: allowed is >= 0.00809339, blade_mass blade_cg^2",
+    ),
+    "factors of dampers of another number of blades": (
+        (*R0, "blade_lag_damping"),
+        [1.0, 0.0],
+        "rotors[0].blade_lag_damping = [1.0, 0.0]: allowed is a list of 3, one of each blade",
+    ),
+    "damper without a length": (
+        (*R0, "lag_damper"),
+        {"damping": 5.0},
+        "rotors[0].lag_damper.damping = 5.0: allowed is 0 where both ends of the damper are in one place",
     ),
     "no rotors": (("rotors",), [], "rotors = []: allowed is a list of at least 1"),
     "sense of rotation": ((*R0, "rotation"), 2, "rotors[0].rotation = 2: allowed is one of 1, -1"),

@@ -1,5 +1,6 @@
 """The compiled derivative against the plain reference, and against closed forms (theory.md sections 2 to 7)."""
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -22,7 +23,7 @@ from helpers import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plain_model import multiblade_matrix, plain_derivative, random_state
+from plain_model import blade_azimuths, damper_length, multiblade_matrix, plain_derivative, random_state
 from scipy.optimize import brentq
 
 from sbs_sim.aircraft import Aircraft
@@ -39,6 +40,7 @@ ODD_BLADE = {
     "flap_rest_deg": 2.5,
     "lag_rest_deg": -7.0,
     "lag_damping": 0.4,
+    "lag_damper": {"damping": 300.0, "a": 0.004, "b": 0.01, "c": 0.03, "d": 0.025, "r": 0.015},
     "pitch_flap_coupling": 0.3,
     "pitch_lag_coupling": -0.2,
     "chord": {"root": 0.06, "tip": 0.035},
@@ -76,6 +78,10 @@ AIRCRAFT = {
         "rotors": [{"blades": 7}, {"blades": 12}],
     },
     "tail_rotor": {"rotors": [{}, {"speed_rpm": 2300.0}, TAIL_ROTOR]},
+    "unequal_lag_dampers": {
+        "every_rotor": ODD_BLADE | {"blades": 4},
+        "rotors": [{"blade_lag_damping": [1.0, 0.0, 2.0, 0.5]}, {"lag_damper": {"damping": 0.0}}],
+    },
     "tandem": {"rotors": [{"hub": [0.9, 0.0, -0.1]}, {"hub": [-0.9, 0.0, -0.3]}]},
     "single_upside_down": {"rotors": [{"hub": [0.1, 0.2, 0.3], "shaft_direction": [0.0, 0.0, 1.0]}]},
     # every section at a Reynolds number beyond the table's, above and below
@@ -329,8 +335,9 @@ def test_springs_hold_blades_at_their_rest_angles():
         lag = brentq(lambda y, pull: rotor.lag_spring * (rotor.lag_rest - y) - pull * np.sin(y), -0.2, 0, (stiffness,))
         arm = s1 * (e_l * np.cos(lag) + e_f)
         flap = brentq(
-            lambda b, arm: rotor.flap_spring * (rotor.flap_rest - b)
-            - rotor.speed**2 * np.sin(b) * (a1 * np.cos(b) + arm),
+            lambda b, arm: (
+                rotor.flap_spring * (rotor.flap_rest - b) - rotor.speed**2 * np.sin(b) * (a1 * np.cos(b) + arm)
+            ),
             0,
             0.1,
             (arm,),
@@ -350,6 +357,62 @@ def test_lag_damper_damps_every_lag_mode():
     rotor = model.aircraft.rotors[0]
     found = mode_frequencies(model, model.layout.lag(0), model.layout.lag_rate(0))
     np.testing.assert_allclose(found.real, -damping / (2 * inertias(rotor)[2] * rotor.speed), rtol=1e-4)
+
+
+def test_axial_damper_damps_by_the_square_of_its_lever():
+    """A damper across from c inboard to d ahead of the hinge: lever c d / sqrt(c^2 + d^2) about it."""
+    damping, inboard, ahead = 900.0, 0.03, 0.04
+    model = Model(stand(lag_damper={"damping": damping, "c": inboard, "d": ahead}))
+    rotor = model.aircraft.rotors[0]
+    found = mode_frequencies(model, model.layout.lag(0), model.layout.lag_rate(0))
+    rotational = damping * (inboard * ahead) ** 2 / (inboard**2 + ahead**2)
+    np.testing.assert_allclose(found.real, -rotational / (2 * inertias(rotor)[2] * rotor.speed), rtol=1e-4)
+
+
+def test_lever_of_the_lag_damper_of_the_uh60a():
+    """Linkage of NASA CR-166309: the lever at the spring's rest angle is the distance of the hinge from its line.
+
+    Without pitch and flap the line goes from (-c, r) to (b, d), along and ahead; a is the same height all along.
+    """
+    inch = 0.0254
+    a, b, c, d, r = (inch * length for length in (0.227, 3.242, 12.04, 10.0102, 6.898))
+    linkage = {"damping": 21890.854, "a": a, "b": b, "c": c, "d": d, "r": r}
+    model = Model(stand(blades=4, lag_damper=linkage, lag_spring=60.0))
+    rotor = model.aircraft.rotors[0]
+    x = model.state()
+    x[model.layout.lag_rate(0).start] = rate = 0.1
+    lever = (c * d + b * r) / math.hypot(b + c, d - r, a)
+    assert lever / inch == pytest.approx(9.16, abs=0.01)
+    without = Model(stand(blades=4, lag_spring=60.0)).derivative(x)
+    change = (model.derivative(x) - without)[model.layout.lag_rate(0).start]
+    assert change == pytest.approx(-21890.854 * lever**2 * rate / inertias(rotor)[2], rel=1e-5)
+
+
+def test_pitch_and_flap_move_the_axial_damper():
+    """The moments of its force are those of virtual work: the power that it takes is c times its rate squared."""
+    damper = ODD_BLADE["lag_damper"]
+    model = Model(stand(lag_damper=damper, swashplate_phase_deg=20.0))
+    rotor, layout = model.aircraft.rotors[0], model.layout
+    still = Model(stand(swashplate_phase_deg=20.0))
+    x, swash = model.state(), np.array([[0.1, 0.05, -0.07]])
+    x[layout.flap(0).start], x[layout.flap_rate(0).start] = 0.05, 3.0
+    x[layout.lag(0).start], x[layout.lag_rate(0).start] = 0.08, -2.0
+    psi = np.array([0.3])
+    lost = model.derivative(x, swash, psi) - still.derivative(x, swash, psi)
+    swing = blade_azimuths(rotor.blades, psi[0]) + rotor.swashplate_phase
+    pitch = 0.1 - 0.05 * np.cos(swing) + 0.07 * np.sin(swing)
+    rate = rotor.speed * (0.05 * np.sin(swing) + 0.07 * np.cos(swing))
+    lengths = [
+        [damper_length(rotor, 0.05 + 3.0 * t, 0.08 - 2.0 * t, pitch + rate * t) for t in (-1e-6, 1e-6)],
+        [damper_length(rotor, 0.05, 0.08 + t, pitch) for t in (-1e-6, 1e-6)],
+        [damper_length(rotor, 0.05 + t, 0.08, pitch) for t in (-1e-6, 1e-6)],
+    ]
+    axial, by_lag, by_flap = (np.subtract(after, before) / 2e-6 for before, after in lengths)
+    e_f, (s1, a1, _) = rotor.flap_hinge_offset, inertias(rotor)
+    a2 = rotor.blade_mass * e_f**2 + 2 * e_f * s1 * np.cos(0.05) + a1 * np.cos(0.05) ** 2
+    force = -damper["damping"] * axial
+    assert lost[layout.lag_rate(0).start] == pytest.approx(np.mean(by_lag * force) / a2, rel=1e-6)
+    assert lost[layout.flap_rate(0).start] == pytest.approx(np.mean(by_flap * force) / a1, rel=1e-6)
 
 
 @pytest.mark.parametrize("coordinate", ["flap", "lag"])

@@ -390,6 +390,17 @@ def limited_slope(before, after):
     return np.sign(after) * min(abs(before + after) / 2, 3 * abs(before), 3 * abs(after))
 
 
+def hinge_pitch(blade, swash):
+    """Return the pitch at the hinge [rad] and its rate [rad/s] while the swashplate stands still (section 4.5)."""
+    rotor, swing = blade.rotor, blade.azimuth + blade.rotor.swashplate_phase
+    pitch = swash[0] - swash[1] * rotor.rotation * np.cos(swing) - swash[2] * np.sin(swing)
+    rate = rotor.speed * (swash[1] * rotor.rotation * np.sin(swing) - swash[2] * np.cos(swing))
+    return (
+        pitch - rotor.pitch_flap_coupling * blade.flap - rotor.pitch_lag_coupling * blade.lag,
+        rate - rotor.pitch_flap_coupling * blade.flap_rate - rotor.pitch_lag_coupling * blade.lag_rate,
+    )
+
+
 def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
     """Return the aerodynamic force of every element of a blade.
 
@@ -413,20 +424,12 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
     length = rotor.radius - rotor.hinge_offset
     edges = np.linspace(rotor.root_cutout, length, ac.options.elements + 1)
     lambda0, lambdas, lambdac = inflow
-    swing = blade.azimuth + rotor.swashplate_phase
     loads = []
     for inner, outer in pairwise(edges):
         s, ds = (inner + outer) / 2, outer - inner
         chord = rotor.chord_root + (rotor.chord_tip - rotor.chord_root) * s / length
-        pitch = (
-            swash[0]
-            + rotor.twist_root
-            + (rotor.twist_tip - rotor.twist_root) * s / length
-            - swash[1] * rotor.rotation * np.cos(swing)
-            - swash[2] * np.sin(swing)
-            - rotor.pitch_flap_coupling * blade.flap
-            - rotor.pitch_lag_coupling * blade.lag
-        )
+        twist = rotor.twist_root + (rotor.twist_tip - rotor.twist_root) * s / length
+        pitch = hinge_pitch(blade, swash)[0] + twist
         velocity = blade.velocity(s, air_velocity_hub)
         cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
         induced = rotor.speed * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
@@ -542,6 +545,7 @@ class Instant(NamedTuple):
     fuselage_force: np.ndarray  # aerodynamic, at the origin [N]
     blades: list  # over rotors of lists of Blade
     air_loads: list  # over rotors, over blades, of lists of (s, force)
+    pitches: list  # over rotors, over blades, of pairs: pitch at the hinge [rad] and its rate [rad/s]
 
 
 def unpack(instant, unknowns):
@@ -635,7 +639,37 @@ def hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, 
         about_lag += cross(blade.flap_arm + s * blade.d, load)
     flap = blade.f @ about_flap - rotor.flap_spring * (blade.flap - rotor.flap_rest)
     lag = -rotor.rotation * blade.u @ about_lag - rotor.lag_spring * (blade.lag - rotor.lag_rest)
-    return flap, lag - rotor.lag_damping * blade.lag_rate
+    flap_damper, lag_damper = damper_moments(rotor, blade, instant.pitches[j][k])
+    factor = 1.0 if rotor.blade_lag_damping is None else rotor.blade_lag_damping[k]
+    return flap + factor * flap_damper, lag + factor * (lag_damper - rotor.lag_damping * blade.lag_rate)
+
+
+def damper_length(rotor, flap, lag, pitch):
+    """Return the length of the axial lag damper [m], from the places of its ends.
+
+    In axes that do not flap, lag or pitch, with their origin at the hinges: outboard, ahead, up. The end on the blade
+    is turned by lag about the last axis and then by flap about the second.
+    """
+    lag = lag - rotor.lag_rest
+    outboard = rotor.damper_b * np.cos(lag) + rotor.damper_d * np.sin(lag)
+    ahead = rotor.damper_d * np.cos(lag) - rotor.damper_b * np.sin(lag)
+    x = outboard * np.cos(flap) + rotor.damper_a * np.sin(flap) + rotor.damper_c
+    y = ahead - rotor.damper_r * np.cos(pitch)
+    z = rotor.damper_a * np.cos(flap) - outboard * np.sin(flap) - rotor.damper_r * np.sin(pitch)
+    return np.sqrt(x**2 + y**2 + z**2)
+
+
+def damper_moments(rotor, blade, pitch):
+    """Return the moments [N m] of the axial damper that raise flap and lag: force times length by angle.
+
+    `pitch` is a pair, the angle at the hinge [rad] and its rate [rad/s]; a complex step differentiates.
+    """
+    if rotor.damper_damping == 0:
+        return 0.0, 0.0
+    angles, rates = np.array([blade.flap, blade.lag, pitch[0]]), np.array([blade.flap_rate, blade.lag_rate, pitch[1]])
+    by_angle = np.array([damper_length(rotor, *(angles + 1e-30j * unit)).imag / 1e-30 for unit in np.eye(3)])
+    force = -rotor.damper_damping * (by_angle @ rates)
+    return by_angle[0] * force, by_angle[1] * force
 
 
 def residual(instant, unknowns):
@@ -709,6 +743,7 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
         fuselage_force=flat_plate_force(ac, air_velocity),
         blades=blades,
         air_loads=air_loads,
+        pitches=[[hinge_pitch(blade, swash[j]) for blade in own] for j, own in enumerate(blades)],
     )
 
 
@@ -914,6 +949,8 @@ def table6_aircraft(environment=None, body=None, options=None, rotors=None):
         "flap_rest": 0.0,
         "lag_rest": 0.0,
         "lag_damping": 0.0,
+        "blade_lag_damping": None,
+        **dict.fromkeys((f"damper_{name}" for name in ("damping", "a", "b", "c", "d", "r")), 0.0),
         "pitch_flap_coupling": 0.0,
         "pitch_lag_coupling": 0.0,
         "chord_root": 0.051,

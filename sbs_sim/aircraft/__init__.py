@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks, config_file, validation
 from sbs_sim.aircraft.airfoils import load_tables
-from sbs_sim.aircraft.consistency import consistency_problems
+from sbs_sim.aircraft.consistency import consistency_problems, table_problems
 from sbs_sim.aircraft.declaration import cached_by_class, declarations, frozen, schema_of, values_of
 from sbs_sim.aircraft.description import Array, Description, Range, Rotor
 from sbs_sim.aircraft.model_records import model_of, with_fidelity
@@ -107,6 +107,8 @@ class Aircraft(Description):
             raise AircraftError("; ".join(problems))
         data = separate(data)
         values = values_of(cls, data)
+        if problems := table_problems(values["rotors"]):
+            raise AircraftError("; ".join(problems))
         known = (similar.rotors, similar.tables) if similar else ((), ())
         tables = load_tables(values["rotors"], folder, *known)
         aircraft = cls(**values, tables=tables, data=data, folder=folder.absolute())

@@ -1,6 +1,7 @@
 """Relations between several values of an aircraft that physics demands and no JSON schema can express."""
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,36 @@ RESERVED_NAMES = frozenset(
     | {"roll", "heading", "airspeed", "climb_rate", "turn_rate", "residual", "acceleration", "warnings"}
 ) - {*CONTROL_NAMES}
 MIN_LENGTH = 1e-6  # m, of a damper
+LINE, TABLE = ("root", "tip"), ("stations", "values")  # the two ways to give values along the blade
+
+
+def table_problems(rotors: Sequence[Rotor]) -> list[str]:
+    """What is wrong with the values along the blades, which are checked before the mean chord is needed."""
+    return [
+        f"rotors[{i}].{key}{problem}"
+        for i, rotor in enumerate(rotors)
+        for key, name in (("chord", "chord"), ("twist_deg", "twist"))
+        for problem in _table_problems(**{part: getattr(rotor, f"{name}_{part}") for part in (*LINE, *TABLE)})
+    ]
+
+
+def _table_problems(**parts: Any) -> list[str]:
+    given = [part for part, value in parts.items() if value is not None]
+    if not given:
+        return [": missing key"]
+    kinds = [kind for kind in (LINE, TABLE) if set(kind) & set(given)]
+    if len(kinds) > 1:
+        return [f": has {', '.join(given)}, allowed are root and tip, or stations and values"]
+    if missing := [part for part in kinds[0] if part not in given]:
+        return [f".{missing[0]}: missing key"]
+    if kinds[0] == LINE:
+        return []
+    stations, values = parts["stations"], parts["values"]
+    if len(stations) != len(values):
+        return [f".values: allowed are {len(stations)} numbers, one of each station, not {len(values)}"]
+    if not np.all(np.diff(stations) > 0):
+        return [f".stations = {stations.tolist()}: allowed are increasing numbers"]
+    return []
 
 
 def consistency_problems(aircraft: "Aircraft") -> list[str]:

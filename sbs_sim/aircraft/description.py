@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sbs_sim.aircraft.declaration import (
     array,
     choice,
+    converter,
     declared,
     frozen,
     integer,
@@ -128,6 +129,31 @@ def _offsets() -> Any:
 
     text = "Swashplate angles where all pilot controls are zero; those left out are 0"
     return declared(text, schema, angles, unit="deg", default={})
+
+
+MAX_STATIONS = 200
+
+
+def _stations(key: str) -> Any:
+    """Field with the stations of a table along the blade."""
+    return declared(
+        f"Stations of {key}.values as shares of the radius from the axis, increasing; in place of root and tip",
+        list_schema(number_schema(0, 1), 2, MAX_STATIONS),
+        frozen,
+        unit="1",
+        key=f"{key}.stations",
+        symbol="c" if key == "chord" else "",
+        default=None,
+    )
+
+
+def _station_values(what: str, minimum: float, maximum: float, unit: str, **more: Any) -> Any:
+    """Field with the values of a table along the blade."""
+    text = f"{what} at the stations, linear between them, constant beyond the first and the last"
+    schema, convert = list_schema(number_schema(minimum, maximum), 2, MAX_STATIONS), converter(unit)
+    return declared(
+        text, schema, lambda values: frozen([convert(value) for value in values]), unit=unit, default=None, **more
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,12 +299,18 @@ class Rotor(ByContent):
     pitch_lag_coupling: float = number(
         "Blade pitch taken off per lag angle", -10, 10, "rad/rad", symbol=r"K_{t\xi}", model_field="pitch_lag_coupling"
     )
-    chord_root: float = number(
-        "Chord at the flap hinge, linear to the tip", 1e-12, 10, "m", key="chord.root", symbol="c"
+    chord_root: float | None = number(
+        "Chord at the flap hinge, linear to the tip", 1e-12, 10, "m", key="chord.root", symbol="c", default=None
     )
-    chord_tip: float = number("Chord at the tip", 1e-12, 10, "m", key="chord.tip", symbol="c")
-    twist_root: float = number("Twist at the flap hinge, linear to the tip", -90, 90, "deg", key="twist_deg.root")
-    twist_tip: float = number("Twist at the tip", -90, 90, "deg", key="twist_deg.tip")
+    chord_tip: float | None = number("Chord at the tip", 1e-12, 10, "m", key="chord.tip", symbol="c", default=None)
+    chord_stations: Array | None = _stations("chord")
+    chord_values: Array | None = _station_values("Chord", 1e-12, 10, "m", key="chord.values", symbol="c")
+    twist_root: float | None = number(
+        "Twist at the flap hinge, linear to the tip", -90, 90, "deg", key="twist_deg.root", default=None
+    )
+    twist_tip: float | None = number("Twist at the tip", -90, 90, "deg", key="twist_deg.tip", default=None)
+    twist_stations: Array | None = _stations("twist_deg")
+    twist_values: Array | None = _station_values("Twist", -90, 90, "deg", key="twist_deg.values")
     root_cutout: float = number(
         "Distance from the flap hinge to where the blade's profile begins", 0, 50, "m", symbol="r_c"
     )
@@ -302,6 +334,33 @@ class Rotor(ByContent):
     def blade_length(self) -> float:
         """L, from the flap hinge to the tip [m]."""
         return self.radius - self.hinge_offset
+
+    def chord_at(self, share: Any) -> Any:
+        """Chord [m] at shares of the length from the flap hinge to the tip, a number or an array."""
+        return self._along(share, self.chord_root, self.chord_tip, self.chord_stations, self.chord_values)
+
+    def twist_at(self, share: Any) -> Any:
+        """Twist [rad] at shares of the length from the flap hinge to the tip, a number or an array."""
+        return self._along(share, self.twist_root, self.twist_tip, self.twist_stations, self.twist_values)
+
+    def _along(
+        self, share: Any, root: float | None, tip: float | None, stations: Array | None, values: Array | None
+    ) -> Any:
+        """Value of a table over the radius, or of a line from the hinge to the tip."""
+        if stations is not None and values is not None:
+            return np.interp((self.hinge_offset + share * self.blade_length) / self.radius, stations, values)
+        assert root is not None and tip is not None, "checked with the file"  # noqa: PT018
+        return root + share * (tip - root)
+
+    @property
+    def mean_chord(self) -> float:
+        """Mean chord from the flap hinge to the tip [m]."""
+        if self.chord_stations is None:
+            return float(0.5 * (self.chord_at(0.0) + self.chord_at(1.0)))
+        inner = (self.chord_stations * self.radius - self.hinge_offset) / self.blade_length
+        knots = np.array([0.0, *inner[(inner > 0.0) & (inner < 1.0)], 1.0])
+        chords = self.chord_at(knots)
+        return float(np.sum(np.diff(knots) * (chords[1:] + chords[:-1])) / 2)
 
     @property
     def first_moment(self) -> float:
@@ -340,12 +399,10 @@ class Rotor(ByContent):
         length = self.blade_length
         width = (length - self.root_cutout) / count
         span = self.root_cutout + width * (np.arange(count) + 0.5)
-        along = span / length
-        chord = self.chord_root + along * (self.chord_tip - self.chord_root)
+        chord = self.chord_at(span / length)
         lift_end = self.tip_loss * self.radius - self.hinge_offset
         lift = np.clip((lift_end - (span - width / 2)) / width, 0.0, 1.0)
-        twist = self.twist_root + along * (self.twist_tip - self.twist_root)
-        return np.stack([span, chord, chord * width / 2, lift, twist])
+        return np.stack([span, chord, chord * width / 2, lift, self.twist_at(span / length)])
 
 
 @dataclass(frozen=True)

@@ -222,6 +222,30 @@ def test_fuselage_and_turning_blades_make_up_the_aircraft():
     np.testing.assert_allclose(inertia, aircraft.body.inertia, atol=1e-13)
 
 
+def test_tables_along_the_blade(sbs):
+    """Stations count from the axis, in shares of the radius; two points from hinge to tip are root and tip."""
+    hinge = 0.075 / 0.505
+    two = sbs.with_values(
+        {
+            "rotors.chord": {"stations": [hinge, 1.0], "values": [0.06, 0.04]},
+            "rotors.twist_deg": {"stations": [hinge, 1.0], "values": [10.0, -4.0]},
+        }
+    )
+    line = sbs.with_values({"rotors.chord": {"root": 0.06, "tip": 0.04}, "rotors.twist_deg": {"root": 10, "tip": -4}})
+    np.testing.assert_allclose(two.rotors[0].elements(20), line.rotors[0].elements(20), rtol=1e-13)
+    assert two.rotors[0].mean_chord == pytest.approx(0.05, rel=1e-14)
+    bent = {"stations": [0.0, 0.5, 0.8], "values": [0.02, 0.06, 0.03]}
+    rotor = sbs.with_value("rotors.chord", bent).rotors[0]
+    span, chord, *_ = rotor.elements(50)
+    radius = (0.075 + span) / 0.505
+    expected = np.where(radius < 0.5, 0.02 + 0.08 * radius, np.maximum(0.06 - 0.1 * (radius - 0.5), 0.03))
+    np.testing.assert_allclose(chord, expected, rtol=1e-12)
+    area = (0.02 + 0.08 * hinge + 0.06) / 2 * (0.5 - hinge) + 0.045 * 0.3 + 0.03 * 0.2
+    assert rotor.mean_chord == pytest.approx(area / (1 - hinge), rel=1e-12)
+    changed = sbs.with_value("rotors.chord", bent).with_value("rotors.MR1.chord.values[1]", 0.07)
+    assert [own.chord_values[1] for own in changed.rotors] == [0.07, 0.06]
+
+
 def test_mass_first_moment_and_inertia_of_a_blade_are_independent(sbs):
     """UH-60A after Howlett, NASA CR-166309: no uniform blade has these three."""
     blade = {"mass": 116.527879853, "first_moment": 385.66081570248, "inertia": 2050.8103068}
@@ -321,6 +345,8 @@ OPTIONAL = {
     "lag_rest_deg",
     "blade_lag_damping",
     "lag_damper",
+    "stations",
+    "values",
 }
 NOT_IN_THE_MODEL = {
     "name",
@@ -393,6 +419,10 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
         assert path[:3] == ("rotors", 0, "mixing") or OPTIONAL & set(path), "a key that sbs.yaml does not show"
     if path[2:3] == ("lag_damper",):
         data["rotors"][0]["lag_damper"] = {"c": 0.02, "d": 0.03}
+    if path[-1] in ("stations", "values"):
+        data["rotors"][0][path[2]] = {"stations": [0.2, 0.6, 1.0], "values": [0.05, 0.04, 0.03]}
+        aircraft, value = Aircraft.from_dict(data), get(data, path)
+        everything, arrays = flattened(aircraft), model_arrays(aircraft)
     put(data, path, other_value(path, value))
     aircraft = Aircraft.from_dict(data)
     assert flattened(aircraft) != everything
@@ -424,7 +454,7 @@ REFUSED = {
     "unknown nested key": (
         (*R1, "chord", "middle"),
         0.05,
-        "rotors[1].chord.middle: unknown key, allowed are root, tip",
+        "rotors[1].chord.middle: unknown key, allowed are root, tip, stations, values",
     ),
     "unknown control in a mixing": (
         (*R1, "mixing", "collective", "pedal"),
@@ -527,6 +557,23 @@ REFUSED = {
         (*R0, "blade_lag_damping"),
         [1.0, 0.0],
         "rotors[0].blade_lag_damping = [1.0, 0.0]: allowed is a list of 3, one of each blade",
+    ),
+    "two ways to give the chord": (
+        (*R0, "chord", "stations"),
+        [0.0, 1.0],
+        "rotors[0].chord: has root, tip, stations, allowed are root and tip, or stations and values",
+    ),
+    "a table without values": ((*R1, "chord"), {"stations": [0.0, 1.0]}, "rotors[1].chord.values: missing key"),
+    "no twist": ((*R0, "twist_deg"), {}, "rotors[0].twist_deg: missing key"),
+    "a table of two lengths": (
+        (*R1, "chord"),
+        {"stations": [0.0, 1.0], "values": [0.05, 0.05, 0.04]},
+        "rotors[1].chord.values: allowed are 2 numbers, one of each station, not 3",
+    ),
+    "stations that do not increase": (
+        (*R0, "twist_deg"),
+        {"stations": [0.0, 0.5, 0.5], "values": [0.0, 1.0, 2.0]},
+        "rotors[0].twist_deg.stations = [0.0, 0.5, 0.5]: allowed are increasing numbers",
     ),
     "damper without a length": (
         (*R0, "lag_damper"),

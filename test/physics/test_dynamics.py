@@ -91,6 +91,12 @@ AIRCRAFT = {
     "thirteen_elements": {"options": {"elements": 13}},
     "sixty_four_elements": {"options": {"elements": 64}},
     "hundred_and_thirty_one_elements": {"options": {"elements": 131}, "every_rotor": ODD_BLADE},
+    "tables_along_the_blade": {
+        "rotors": [
+            {"chord": {"stations": [0.0, 0.3, 0.32, 0.9, 1.0], "values": [0.02, 0.05, 0.06, 0.055, 0.03]}},
+            {"twist_deg": {"stations": [0.25, 0.6, 0.94], "values": [8.0, 1.0, -6.0]}},
+        ]
+    },
     "two_airfoils": {"rotors": [{"airfoil": "linear_573"}, {"airfoil": "naca0012"}]},
     "central_hinges": {"every_rotor": {"hinge_offset": 0.0, "flap_hinge_offset": 0.0}},
     "vacuum": {"environment": {"air_density": 0.0}, "every_rotor": ODD_BLADE},
@@ -357,6 +363,18 @@ def test_lag_damper_damps_every_lag_mode():
     rotor = model.aircraft.rotors[0]
     found = mode_frequencies(model, model.layout.lag(0), model.layout.lag_rate(0))
     np.testing.assert_allclose(found.real, -damping / (2 * inertias(rotor)[2] * rotor.speed), rtol=1e-4)
+
+
+def test_lag_of_the_rotor_of_hammond():
+    """His blade (J. AHS 19 (4), 1974) has a free mass, first moment and inertia: nu^2 = e S / I = 0.28502^2."""
+    share, speed = 1e-6, 255 * np.pi / 30  # a millionth of the mass, so that the hub stands still
+    blade = {"blade_mass": 94.9 * share, "blade_cg": 289.1 / 94.9, "blade_inertia": 1084.7 * share}
+    hinges = {"hinge_offset": 0.3048, "flap_hinge_offset": 0.0, "flap_spring": 0.0, "lag_damping": 4067.5 * share}
+    model = Model(stand(blades=4, radius=6.0, speed_rpm=255.0, **blade, **hinges))
+    found = mode_frequencies(model, model.layout.lag(0), model.layout.lag_rate(0))
+    decay = 4067.5 / (2 * 1084.7 * speed)
+    np.testing.assert_allclose(found.real, -decay, rtol=1e-4)
+    np.testing.assert_allclose(found.imag, seen_from_the_body(math.sqrt(0.28502**2 - decay**2), 4), rtol=1e-4)
 
 
 def test_axial_damper_damps_by_the_square_of_its_lever():

@@ -390,6 +390,18 @@ def limited_slope(before, after):
     return np.sign(after) * min(abs(before + after) / 2, 3 * abs(before), 3 * abs(after))
 
 
+def along_blade(rotor, name, s):
+    """Return the chord [m] or twist [rad] at the station s from the flap hinge [m] (section 4.1)."""
+    stations, values = getattr(rotor, f"{name}_stations"), getattr(rotor, f"{name}_values")
+    if stations is None:
+        root, tip = getattr(rotor, f"{name}_root"), getattr(rotor, f"{name}_tip")
+        return root + (tip - root) * s / (rotor.radius - rotor.hinge_offset)
+    share = min(max((rotor.hinge_offset + s) / rotor.radius, stations[0]), stations[-1])
+    points = pairwise(zip(stations, values, strict=True))
+    (inner, first), (outer, last) = next(pair for pair in points if share <= pair[1][0])
+    return first + (last - first) * (share - inner) / (outer - inner)
+
+
 def hinge_pitch(blade, swash):
     """Return the pitch at the hinge [rad] and its rate [rad/s] while the swashplate stands still (section 4.5)."""
     rotor, swing = blade.rotor, blade.azimuth + blade.rotor.swashplate_phase
@@ -427,9 +439,8 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
     loads = []
     for inner, outer in pairwise(edges):
         s, ds = (inner + outer) / 2, outer - inner
-        chord = rotor.chord_root + (rotor.chord_tip - rotor.chord_root) * s / length
-        twist = rotor.twist_root + (rotor.twist_tip - rotor.twist_root) * s / length
-        pitch = hinge_pitch(blade, swash)[0] + twist
+        chord = along_blade(rotor, "chord", s)
+        pitch = hinge_pitch(blade, swash)[0] + along_blade(rotor, "twist", s)
         velocity = blade.velocity(s, air_velocity_hub)
         cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
         induced = rotor.speed * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
@@ -955,6 +966,7 @@ def table6_aircraft(environment=None, body=None, options=None, rotors=None):
         "pitch_lag_coupling": 0.0,
         "chord_root": 0.051,
         "chord_tip": 0.051,
+        **dict.fromkeys(("chord_stations", "chord_values", "twist_stations", "twist_values")),
         "twist_root": 0.0,
         "twist_tip": 0.0,
         "root_cutout": 0.0,

@@ -387,12 +387,18 @@ def allowed(schema: Mapping[str, Any]) -> str:
     if kind == "array":
         sizes = []
         while schema["type"] == "array":
-            fixed = schema["minItems"] == schema["maxItems"]
-            sizes.append(f"{'' if fixed else 'up to '}{schema['maxItems']}")
+            least, most = schema["minItems"], schema["maxItems"]
+            sizes.append(str(least) if least == most else f"{least} to {most}")
             schema = schema["items"]
         return f"{' × '.join(sizes)} numbers, each {allowed(schema)}"
     low = f"{schema['minimum']:g}" if "minimum" in schema else f"above {schema['exclusiveMinimum']:g}"
     return f"{low} to {schema['maximum']:g}{', integer' if kind == 'integer' else ''}"
+
+
+def _default(declaration: Declaration) -> str:
+    if declaration.is_required:
+        return ""
+    return "optional" if declaration.default is None else shown(declaration.default)
 
 
 def aircraft_row(path: str, name: str, declaration: Declaration) -> list[str]:
@@ -403,7 +409,7 @@ def aircraft_row(path: str, name: str, declaration: Declaration) -> list[str]:
         ", ".join(f"${symbol}$" for symbol in declaration.symbol.split(", ") if symbol),
         allowed(declaration.schema),
         f"{declaration.unit}{converted}",
-        "" if declaration.is_required else shown(declaration.default),
+        _default(declaration),
         f"`{name}`",
         cell(declaration.text),
     ]

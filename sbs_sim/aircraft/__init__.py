@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks, config_file, validation
 from sbs_sim.aircraft.airfoils import load_tables
-from sbs_sim.aircraft.consistency import consistency_problems
+from sbs_sim.aircraft.consistency import consistency_problems, table_problems
 from sbs_sim.aircraft.declaration import cached_by_class, declarations, frozen, schema_of, values_of
 from sbs_sim.aircraft.description import Array, Description, Range, Rotor
 from sbs_sim.aircraft.model_records import model_of, with_fidelity
@@ -117,6 +117,8 @@ class Aircraft(Description):
             raise AircraftError("; ".join(problems))
         data = separate(data)
         values = values_of(cls, data)
+        if problems := table_problems(values["rotors"]):
+            raise AircraftError("; ".join(problems))
         known = (similar.rotors, similar.tables) if similar else ((), ())
         tables = load_tables(values["rotors"], folder, *known)
         aircraft = cls(**values, tables=tables, data=data, folder=folder.absolute())
@@ -198,6 +200,11 @@ class Aircraft(Description):
     def layout(self) -> StateLayout:
         """Indices and names of the states of this aircraft."""
         return StateLayout(tuple(rotor.blades for rotor in self.rotors))
+
+    @cached_property
+    def passages(self) -> tuple[int, ...]:
+        """How often each rotor is the same again in one revolution: with every blade, or once if its blades differ."""
+        return tuple(rotor.blades if rotor.has_equal_blades else 1 for rotor in self.rotors)
 
     @cached_property
     def parameter_hash(self) -> str:

@@ -40,7 +40,7 @@ def load_tables(
 
 def _section(rotor: Rotor) -> tuple[str, float]:
     """Airfoil and aspect ratio of a rotor's blades."""
-    return rotor.airfoil, 2 * rotor.radius / (rotor.chord_root + rotor.chord_tip)
+    return rotor.airfoil, rotor.radius / rotor.mean_chord
 
 
 def _read_table(i: int, rotor: Rotor, folder: Path, known: dict[str, AirfoilTable]) -> AirfoilTable:

@@ -1,6 +1,7 @@
 """Relations between several values of an aircraft that physics demands and no JSON schema can express."""
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,37 @@ RESERVED_NAMES = frozenset(
     {*EULER_NAMES, *SWASHPLATE_NAMES, "time", "thrust", "torque", "power", "state", "controls", "swashplate", "pitch"}
     | {"roll", "heading", "airspeed", "climb_rate", "turn_rate", "residual", "acceleration", "warnings"}
 ) - {*CONTROL_NAMES}
+MIN_LENGTH = 1e-6  # m, of a damper
+LINE, TABLE = ("root", "tip"), ("stations", "values")  # the two ways to give values along the blade
+
+
+def table_problems(rotors: Sequence[Rotor]) -> list[str]:
+    """What is wrong with the values along the blades, which are checked before the mean chord is needed."""
+    return [
+        f"rotors[{i}].{key}{problem}"
+        for i, rotor in enumerate(rotors)
+        for key, name in (("chord", "chord"), ("twist_deg", "twist"))
+        for problem in _table_problems(**{part: getattr(rotor, f"{name}_{part}") for part in (*LINE, *TABLE)})
+    ]
+
+
+def _table_problems(**parts: Any) -> list[str]:
+    given = [part for part, value in parts.items() if value is not None]
+    if not given:
+        return [": missing key"]
+    kinds = [kind for kind in (LINE, TABLE) if set(kind) & set(given)]
+    if len(kinds) > 1:
+        return [f": has {', '.join(given)}, allowed are root and tip, or stations and values"]
+    if missing := [part for part in kinds[0] if part not in given]:
+        return [f".{missing[0]}: missing key"]
+    if kinds[0] == LINE:
+        return []
+    stations, values = parts["stations"], parts["values"]
+    if len(stations) != len(values):
+        return [f".values: allowed are {len(stations)} numbers, one of each station, not {len(values)}"]
+    if not np.all(np.diff(stations) > 0):
+        return [f".stations = {stations.tolist()}: allowed are increasing numbers"]
+    return []
 
 
 def consistency_problems(aircraft: "Aircraft") -> list[str]:
@@ -119,16 +151,33 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
             f"< {length:g}, from the flap hinge to the tip",
         ),
         (
-            rotor.blade_cg <= length / math.sqrt(3) or length <= 0,
+            rotor.blade_inertia is not None or rotor.blade_cg <= length / math.sqrt(3) or length <= 0,
             "blade_cg",
             f"<= {length / math.sqrt(3):.6g}, L/sqrt(3): the blade's second moment is m_b L^2/3",
         ),
+        (
+            rotor.blade_inertia is None or rotor.blade_inertia >= rotor.first_moment * rotor.blade_cg,
+            "blade_inertia",
+            f">= {rotor.first_moment * rotor.blade_cg:.6g}, blade_mass blade_cg^2",
+        ),
+    ]
+    factors = rotor.lag_damping_factors
+    relations += [
+        (len(factors) == rotor.blades, "blade_lag_damping", f"a list of {rotor.blades}, one of each blade"),
     ]
     problems = [
         f"{key} = {_plain(getattr(rotor, key))}: allowed is {text}" for is_met, key, text in relations if not is_met
     ]
+    if rotor.damper_damping > 0.0 and _damper_length(rotor) < MIN_LENGTH:
+        allowed = "0 where both ends of the damper are in one place"
+        problems.append(f"lag_damper.damping = {rotor.damper_damping}: allowed is {allowed}")
     problems += _range_problems("collective_range_deg", rotor.collective_range)
     return problems + _range_problems("cyclic_range_deg", rotor.cyclic_range)
+
+
+def _damper_length(rotor: Rotor) -> float:
+    """Length of the axial lag damper without flap and pitch, at the rest angle of lag [m], eq. (3.7)."""
+    return math.hypot(rotor.damper_b + rotor.damper_c, rotor.damper_d - rotor.damper_r, rotor.damper_a)
 
 
 def _plain(value: Any) -> str:

@@ -17,6 +17,7 @@ from sbs_sim.aircraft.atmosphere import MAX_ALTITUDE, MIN_ALTITUDE, standard_air
 from sbs_sim.aircraft.declaration import (
     array,
     choice,
+    converter,
     declared,
     frozen,
     integer,
@@ -41,6 +42,7 @@ Range = tuple[float, float]
 MAX_ROTORS, MAX_CONTROLS, MAX_SURFACES = 16, 16, 32
 MAX_CONTROL = 1e6  # of a control that is no angle, in its unit
 TRIMMED_CONTROLS = 4  # that a trim finds
+MAX_BLADES = 20
 
 
 @dataclass(frozen=True)
@@ -315,6 +317,31 @@ def _offsets() -> Any:
     return declared(text, schema, angles, unit="deg", default={})
 
 
+MAX_STATIONS = 200
+
+
+def _stations(key: str) -> Any:
+    """Field with the stations of a table along the blade."""
+    return declared(
+        f"Stations of {key}.values as shares of the radius from the axis, increasing; in place of root and tip",
+        list_schema(number_schema(0, 1), 2, MAX_STATIONS),
+        frozen,
+        unit="1",
+        key=f"{key}.stations",
+        symbol="c" if key == "chord" else "",
+        default=None,
+    )
+
+
+def _station_values(what: str, minimum: float, maximum: float, unit: str, **more: Any) -> Any:
+    """Field with the values of a table along the blade."""
+    text = f"{what} at the stations, linear between them, constant beyond the first and the last"
+    schema, convert = list_schema(number_schema(minimum, maximum), 2, MAX_STATIONS), converter(unit)
+    return declared(
+        text, schema, lambda values: frozen([convert(value) for value in values]), unit=unit, default=None, **more
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Rotor(ByContent):
     """One rotor.
@@ -336,9 +363,17 @@ class Rotor(ByContent):
     )
     speed: float = number("Rotor speed", 1, 100000, "rpm", symbol=r"\Omega", model_field="rotor_speed")
     radius: float = number("Rotor radius", 0.01, 50, "m", symbol="R", model_field="radius")
-    blades: int = integer("Number of blades", 3, 20, symbol="N_b")
+    blades: int = integer("Number of blades", 3, MAX_BLADES, symbol="N_b")
     blade_mass: float = number("Mass of a blade", 1e-12, 1e4, "kg", symbol="m_b", model_field="mass")
     blade_cg: float = number("Distance of a blade's c.g. from the flap hinge", 1e-12, 50, "m", symbol="r_G")
+    blade_inertia: float | None = number(
+        "Second moment of a blade about the flap hinge; of a uniform blade by options.flap_inertia if left out",
+        1e-12,
+        1e9,
+        "kg m^2",
+        symbol="A_1",
+        default=None,
+    )
     hinge_offset: float = number(
         "Distance of the flap hinge from the axis", 0, 50, "m", symbol="e_0", model_field="hinge_offset"
     )
@@ -351,8 +386,93 @@ class Rotor(ByContent):
     lag_spring: float = number(
         "Stiffness of the lag hinge", 0, 1e9, "N m/rad", symbol=r"K_\xi", model_field="lag_spring"
     )
+    flap_rest: float = number(
+        "Flap angle at which the flap spring exerts no moment: the precone of a hingeless blade",
+        -45,
+        45,
+        "deg",
+        symbol=r"\beta_0",
+        model_field="flap_rest",
+        default=0.0,
+    )
+    lag_rest: float = number(
+        "Lag angle at which the lag spring exerts no moment",
+        -45,
+        45,
+        "deg",
+        symbol=r"\xi_0",
+        model_field="lag_rest",
+        default=0.0,
+    )
     lag_damping: float = number(
         "Damping of the lag hinge", 0, 1e9, "N m s/rad", symbol=r"C_\xi", model_field="lag_damping"
+    )
+    blade_lag_damping: Array | None = declared(
+        "Factor on the lag damping of each blade, the first blade first; all 1 if left out",
+        list_schema(number_schema(0, 100), 1, MAX_BLADES),
+        frozen,
+        unit="1",
+        default=None,
+    )
+    damper_damping: float = number(
+        "Force of an axial lag damper over its rate",
+        0,
+        1e9,
+        "N s/m",
+        key="lag_damper.damping",
+        symbol="C_d",
+        model_field="damper_damping",
+        default=0.0,
+    )
+    damper_a: float = number(
+        "Linkage of the axial lag damper: its end on the blade, above the blade's axis, at zero flap",
+        -50,
+        50,
+        "m",
+        key="lag_damper.a",
+        symbol=r"h_a",
+        model_field="damper_a",
+        default=0.0,
+    )
+    damper_b: float = number(
+        "Linkage: the same end, along the span from the hinges at the rest angle of lag",
+        -50,
+        50,
+        "m",
+        key="lag_damper.b",
+        symbol=r"h_b",
+        model_field="damper_b",
+        default=0.0,
+    )
+    damper_c: float = number(
+        "Linkage: its end on the hub, inboard of the hinges",
+        -50,
+        50,
+        "m",
+        key="lag_damper.c",
+        symbol=r"h_c",
+        model_field="damper_c",
+        default=0.0,
+    )
+    damper_d: float = number(
+        "Linkage: its end on the blade, ahead of the hinges against lag",
+        -50,
+        50,
+        "m",
+        key="lag_damper.d",
+        symbol=r"h_d",
+        model_field="damper_d",
+        default=0.0,
+    )
+    damper_r: float = number(
+        "Linkage: lever of the end on the hub, which turns with the pitch",
+        -50,
+        50,
+        "m",
+        key="lag_damper.r",
+        symbol=r"h_r",
+        model_field="damper_r",
+        default=0.0,
     )
     pitch_flap_coupling: float = number(
         "Blade pitch taken off per flap angle",
@@ -365,12 +485,18 @@ class Rotor(ByContent):
     pitch_lag_coupling: float = number(
         "Blade pitch taken off per lag angle", -10, 10, "rad/rad", symbol=r"K_{t\xi}", model_field="pitch_lag_coupling"
     )
-    chord_root: float = number(
-        "Chord at the flap hinge, linear to the tip", 1e-12, 10, "m", key="chord.root", symbol="c"
+    chord_root: float | None = number(
+        "Chord at the flap hinge, linear to the tip", 1e-12, 10, "m", key="chord.root", symbol="c", default=None
     )
-    chord_tip: float = number("Chord at the tip", 1e-12, 10, "m", key="chord.tip", symbol="c")
-    twist_root: float = number("Twist at the flap hinge, linear to the tip", -90, 90, "deg", key="twist_deg.root")
-    twist_tip: float = number("Twist at the tip", -90, 90, "deg", key="twist_deg.tip")
+    chord_tip: float | None = number("Chord at the tip", 1e-12, 10, "m", key="chord.tip", symbol="c", default=None)
+    chord_stations: Array | None = _stations("chord")
+    chord_values: Array | None = _station_values("Chord", 1e-12, 10, "m", key="chord.values", symbol="c")
+    twist_root: float | None = number(
+        "Twist at the flap hinge, linear to the tip", -90, 90, "deg", key="twist_deg.root", default=None
+    )
+    twist_tip: float | None = number("Twist at the tip", -90, 90, "deg", key="twist_deg.tip", default=None)
+    twist_stations: Array | None = _stations("twist_deg")
+    twist_values: Array | None = _station_values("Twist", -90, 90, "deg", key="twist_deg.values")
     root_cutout: float = number(
         "Distance from the flap hinge to where the blade's profile begins", 0, 50, "m", symbol="r_c"
     )
@@ -395,6 +521,33 @@ class Rotor(ByContent):
         """L, from the flap hinge to the tip [m]."""
         return self.radius - self.hinge_offset
 
+    def chord_at(self, share: Any) -> Any:
+        """Chord [m] at shares of the length from the flap hinge to the tip, a number or an array."""
+        return self._along(share, self.chord_root, self.chord_tip, self.chord_stations, self.chord_values)
+
+    def twist_at(self, share: Any) -> Any:
+        """Twist [rad] at shares of the length from the flap hinge to the tip, a number or an array."""
+        return self._along(share, self.twist_root, self.twist_tip, self.twist_stations, self.twist_values)
+
+    def _along(
+        self, share: Any, root: float | None, tip: float | None, stations: Array | None, values: Array | None
+    ) -> Any:
+        """Value of a table over the radius, or of a line from the hinge to the tip."""
+        if stations is not None and values is not None:
+            return np.interp((self.hinge_offset + share * self.blade_length) / self.radius, stations, values)
+        assert root is not None and tip is not None, "checked with the file"  # noqa: PT018
+        return root + share * (tip - root)
+
+    @property
+    def mean_chord(self) -> float:
+        """Mean chord from the flap hinge to the tip [m]."""
+        if self.chord_stations is None:
+            return float(0.5 * (self.chord_at(0.0) + self.chord_at(1.0)))
+        inner = (self.chord_stations * self.radius - self.hinge_offset) / self.blade_length
+        knots = np.array([0.0, *inner[(inner > 0.0) & (inner < 1.0)], 1.0])
+        chords = self.chord_at(knots)
+        return float(np.sum(np.diff(knots) * (chords[1:] + chords[:-1])) / 2)
+
     @property
     def first_moment(self) -> float:
         """S1 of a blade about its flap hinge [kg m]."""
@@ -402,8 +555,20 @@ class Rotor(ByContent):
 
     @property
     def second_moment(self) -> float:
-        """A1 of a blade about its flap hinge, m_b L^2 / 3 [kg m^2]."""
+        """A1 of a blade about its flap hinge, m_b L^2 / 3 unless the file has it [kg m^2]."""
+        if self.blade_inertia is not None:
+            return self.blade_inertia
         return self.blade_mass * (self.blade_length * self.blade_length) / 3
+
+    @property
+    def lag_damping_factors(self) -> Array:
+        """Factor on the lag damping of each blade, shape (blades,)."""
+        return np.ones(self.blades) if self.blade_lag_damping is None else self.blade_lag_damping
+
+    @property
+    def has_equal_blades(self) -> bool:
+        """All blades are alike, so that the rotor is the same again after the passage of one."""
+        return bool(np.all(self.lag_damping_factors == self.lag_damping_factors[0]))
 
     def elements(self, count: int) -> Array:
         """Blade elements at their mid-points (theory.md section 4).
@@ -420,12 +585,10 @@ class Rotor(ByContent):
         length = self.blade_length
         width = (length - self.root_cutout) / count
         span = self.root_cutout + width * (np.arange(count) + 0.5)
-        along = span / length
-        chord = self.chord_root + along * (self.chord_tip - self.chord_root)
+        chord = self.chord_at(span / length)
         lift_end = self.tip_loss * self.radius - self.hinge_offset
         lift = np.clip((lift_end - (span - width / 2)) / width, 0.0, 1.0)
-        twist = self.twist_root + along * (self.twist_tip - self.twist_root)
-        return np.stack([span, chord, chord * width / 2, lift, twist])
+        return np.stack([span, chord, chord * width / 2, lift, self.twist_at(span / length)])
 
 
 @dataclass(frozen=True)

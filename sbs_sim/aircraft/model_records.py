@@ -91,6 +91,7 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches = R.records(R.SWITCHES, 1, 1)
     switches["lead_lag"] = switches["cyclic_inflow"] = 1
     switches["complete_coupling"] = aircraft.options.coupling == "complete"
+    switches["axial_dampers"] = any(rotor.damper_damping > 0.0 for rotor in aircraft.rotors)
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
     return switches
 
@@ -112,7 +113,7 @@ def _body(aircraft: "Aircraft") -> NDArray[Any]:
 
 def second_moment(aircraft: "Aircraft", rotor: Rotor) -> float:
     """A_1 in the equations of a blade [kg m^2]."""
-    to_axis = aircraft.options.flap_inertia == "axis_to_tip"
+    to_axis = aircraft.options.flap_inertia == "axis_to_tip" and rotor.blade_inertia is None
     return rotor.blade_mass * (rotor.radius * rotor.radius) / 3 if to_axis else rotor.second_moment
 
 
@@ -123,9 +124,11 @@ def _blade_values(
     columns, first_angle, inverse_step = cell_grid(airfoil)
     cos_phase, sin_phase = cosine_and_sine(rotor.swashplate_phase)
     cos_azimuth_offset, sin_azimuth_offset = cosine_and_sine(2.0 * math.pi * number / rotor.blades)
-    inertia = second_moment(aircraft, rotor)
+    inertia, factor = second_moment(aircraft, rotor), float(rotor.lag_damping_factors[number])
     return {
         **model_values(rotor, R.BLADE),
+        "lag_damping": factor * rotor.lag_damping,
+        "damper_damping": factor * rotor.damper_damping,
         "axes": hub_axes(rotor.shaft_direction),
         "lag_hinge_offset": rotor.hinge_offset - rotor.flap_hinge_offset,
         "first_moment": rotor.first_moment,

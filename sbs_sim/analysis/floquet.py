@@ -98,7 +98,7 @@ def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
     """Shortest time in which every rotor passes a whole number of blades [s], and those numbers.
 
     The differential coordinate of an even number of blades changes its sign with every blade: such a rotor passes an
-    even number.
+    even number. One whose blades differ passes all of them.
 
     Raises
     ------
@@ -106,7 +106,8 @@ def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
         There is none of at most 60 passages.
     """
     blades = np.array([rotor.blades for rotor in aircraft.rotors])
-    each = np.where(blades % 2 == 0, 2, 1)
+    equal = np.array([rotor.has_equal_blades for rotor in aircraft.rotors])
+    each = np.where(equal, np.where(blades % 2 == 0, 2, 1), blades)
     passage = each * 2.0 * math.pi / (blades * np.array([rotor.speed for rotor in aircraft.rotors]))
     for count in range(1, MAX_PASSAGES + 1):
         period = count * float(passage.max())

@@ -123,7 +123,7 @@ def _check_options(aircraft: Aircraft, method: str, step_scale: float) -> float:
 def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> LinearModel:
     """Model by central differences of the averaged derivative."""
     steps = difference_steps(aircraft, step_scale)
-    each = jacobians(aircraft, point, azimuths(aircraft.layout.blades, point.azimuth_count), steps)
+    each = jacobians(aircraft, point, azimuths(aircraft.passages, point.azimuth_count), steps)
     mean = each.mean(axis=0)
     used = used_states(point)
     size = len(point.state)

@@ -91,7 +91,7 @@ class _TaylorTerms:
         self.trim = np.concatenate([point.state, point.controls])
         self.inflow_start = S.LINEAR_BODY_SIZE + 4 * self.layout.blade_count
         self._engine = Engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
-        self._psi = azimuths(aircraft.layout.blades, point.azimuth_count)
+        self._psi = azimuths(aircraft.passages, point.azimuth_count)
         self._constant = [self._turning(rotor) for rotor in aircraft.rotors]
         self._at_trim = [self._coupling(j, point.state[self._places(j)[0]]) for j in range(len(aircraft.rotors))]
 

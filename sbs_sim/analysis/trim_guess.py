@@ -100,8 +100,7 @@ class MomentumRotor:
         self._density = max(aircraft.environment.air_density, MIN_DENSITY)
         # thrust is this times the induced velocity times the flow through the disc, eq. (6.1)
         self._mass_flow = self._density * self.area / (2 * rotor.duct_expansion**2)
-        chord = 0.5 * (rotor.chord_root + rotor.chord_tip)
-        reynolds = 0.75 * self.tip_speed * chord * float(model.air["inverse_viscosity"][0, 0])
+        reynolds = 0.75 * self.tip_speed * rotor.mean_chord * float(model.air["inverse_viscosity"][0, 0])
         curve = _lift_curve(aircraft.tables[j], reynolds)
         self._sum_sections(rotor, rotor.elements(aircraft.options.elements), *curve)
         self._hold_blades(rotor, second_moment(aircraft, rotor), aircraft.environment.gravity)
@@ -132,7 +131,8 @@ class MomentumRotor:
         spring = rotor.hinge_offset * rotor.first_moment * omega2 + rotor.flap_spring
         self._coning_stiffness = rotor.blades * (second_moment * omega2 + spring)
         self._tilt_stiffness = rotor.blades * spring
-        self._droop = rotor.blades * rotor.first_moment * gravity * float(self._axes[2, 2])
+        weight = rotor.first_moment * gravity * float(self._axes[2, 2])
+        self._droop = rotor.blades * (weight - rotor.flap_spring * rotor.flap_rest)
         pull = rotor.blade_mass * rotor.flap_hinge_offset + rotor.first_moment
         lag_offset = rotor.hinge_offset - rotor.flap_hinge_offset
         self._lag_stiffness = rotor.blades * (rotor.lag_spring + lag_offset * pull * omega2)

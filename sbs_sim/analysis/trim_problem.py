@@ -29,6 +29,7 @@ ATTITUDE_UNKNOWNS, CONTROL_UNKNOWNS = 2, 4
 BODY_UNKNOWNS = ATTITUDE_UNKNOWNS + CONTROL_UNKNOWNS
 BODY_STEP, ROTOR_STEP = 1e-5, 1e-6  # of the differences: m/s, rad/s, rad; rad, inflow ratio
 ROUNDING = 1e-10  # deg, or another unit, that a value may be beyond its limit
+UNEQUAL_BLADES = "blades with unequal lag dampers: this is a mean over a revolution, stability needs Floquet's method"
 JACOBIAN_AZIMUTHS = 4  # enough to say where to go, the residual says where to stop
 BODY_BALANCES = (
     "force ahead",
@@ -65,7 +66,7 @@ class TrimProblem:
         self.fidelity = fidelity
         self.layout = aircraft.layout
         self.engine = points_engine(aircraft.arranged(fidelity.lead_lag, fidelity.cyclic_inflow, "points"))
-        self._psi = azimuths(self.layout.blades, fidelity.azimuth_count)
+        self._psi = azimuths(self.aircraft.passages, fidelity.azimuth_count)
         self._places, equations, owners = self._rotor_unknowns()
         self._owners = np.concatenate([np.full(BODY_UNKNOWNS, len(aircraft.rotors)), owners])
         self.equations = np.concatenate([np.arange(S.VELOCITY, S.BODY_SIZE), equations])
@@ -140,7 +141,7 @@ class TrimProblem:
         """
         steps = np.full(len(unknowns), ROTOR_STEP)
         steps[:ATTITUDE_UNKNOWNS] = BODY_STEP
-        psi = azimuths(self.layout.blades, min(self.fidelity.azimuth_count, JACOBIAN_AZIMUTHS))
+        psi = azimuths(self.aircraft.passages, min(self.fidelity.azimuth_count, JACOBIAN_AZIMUTHS))
         engine, (forward, backward) = self.engine, (sides := np.empty((2, len(unknowns), len(self.equations))))
         trim_sides(
             *(engine.code.derivative, engine.model, unknowns, steps, self._owners, condition.along_heading()),
@@ -220,13 +221,14 @@ class TrimProblem:
     def _warnings(self, x: Array, swash: Array) -> tuple[str, ...]:
         """Where the model does not hold, by the mean of the working states over a few azimuths."""
         engine, count = self.engine, min(self.fidelity.azimuth_count, JACOBIAN_AZIMUTHS)
-        psi = azimuths(self.layout.blades, count)
+        psi = azimuths(self.aircraft.passages, count)
         states, angles = engine.lanes([x]), engine.lanes([swash.ravel()])
         places, still_air = engine.lanes(list(psi)), engine.memory(3)
         derivative(engine.model, states, angles, places, still_air, engine.work, engine.tick.slopes[0], False)
         rows = engine.memory(engine.rotors, WORKING_SIZE)
         working_state(engine.model, engine.work, rows)
-        return tuple(warnings(self.aircraft, rows[..., :count].mean(axis=-1)))
+        unequal = (f"{rotor.name}: {UNEQUAL_BLADES}" for rotor in self.aircraft.rotors if not rotor.has_equal_blades)
+        return (*warnings(self.aircraft, rows[..., :count].mean(axis=-1)), *unequal)
 
 
 def _beyond_limits(aircraft: Aircraft, controls: Array, swash: Array) -> tuple[str, ...]:

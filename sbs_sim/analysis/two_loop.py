@@ -76,7 +76,7 @@ class _TwoLoops:
         self._problem, self._condition = problem, condition
         self._body = np.arange(BODY_UNKNOWNS)
         self._coordinates, self._inflow = problem.coordinates, problem.inflow
-        self._azimuths = azimuths(problem.layout.blades, problem.fidelity.azimuth_count)
+        self._azimuths = azimuths(problem.aircraft.passages, problem.fidelity.azimuth_count)
         self._inverse_inertia = solve(problem.aircraft.body.inertia, np.eye(3))
 
     def run(self) -> None:

@@ -103,7 +103,7 @@ def tip_path(rotor: Rotor, flap: Array, magnification: float, count: int) -> Arr
 def blade_mesh(rotor: Rotor) -> Mesh:
     """Blade along x from its flap hinge, its motion along y times the sense of rotation, its upper side along z."""
     ends = []
-    for along, chord in ((rotor.root_cutout, rotor.chord_root), (rotor.blade_length, rotor.chord_tip)):
+    for along, chord in ((rotor.root_cutout, rotor.chord_at(0.0)), (rotor.blade_length, rotor.chord_at(1.0))):
         lead, trail = QUARTER * chord * rotor.rotation, -(1 - QUARTER) * chord * rotor.rotation
         half = 0.5 * THICKNESS * chord
         ends += [[along, lead, 0.0], [along, lead - 0.4 * (lead - trail), half]]

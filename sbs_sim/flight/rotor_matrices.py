@@ -109,13 +109,12 @@ def carrying(aircraft: "Aircraft", rotor: "Rotor") -> tuple[float, float]:
     with linear twist, C_T = sigma a / 2 (theta_75 / 3 - lambda / 2).
     """
     environment, tip_speed = aircraft.environment, rotor.speed * rotor.radius
-    solidity = rotor.blades * 0.5 * (rotor.chord_root + rotor.chord_tip) / (math.pi * rotor.radius)
+    solidity = rotor.blades * rotor.mean_chord / (math.pi * rotor.radius)
     scale = rotor.radius * tip_speed
     pressure = environment.air_density * math.pi * (scale * scale)  # no power: libraries round it as they like
     share = aircraft.body.mass * environment.gravity / len(aircraft.rotors)
     thrust = min(share / pressure, MAX_LOADING * solidity) if pressure > 0.0 else 0.0
     inflow = math.sqrt(0.5 * thrust)
-    twist = rotor.twist_root + 0.75 * (rotor.twist_tip - rotor.twist_root)
-    collective = 6.0 * thrust / (solidity * LIFT_SLOPE) + 1.5 * inflow - twist
+    collective = 6.0 * thrust / (solidity * LIFT_SLOPE) + 1.5 * inflow - rotor.twist_at(0.75)
     least, most = rotor.collective_range
     return inflow, min(max(collective, least), most)

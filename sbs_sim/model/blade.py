@@ -8,10 +8,10 @@ of a counter-clockwise rotor, and mirrored aircraft are mirrored exactly.
 
 from typing import Any, NamedTuple
 
-from sbs_sim.lanes import ZERO, Vector, cross, dot
+from sbs_sim.lanes import ZERO, Vector, cross, dot, rounded
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.section import SectionFlow
-from sbs_sim.model.trigonometry import cosine_sine
+from sbs_sim.model.trigonometry import TINY, cosine_sine, inverse_root
 
 
 class Pose(NamedTuple):
@@ -199,7 +199,7 @@ def hinge_moments(blade, basis, pose, loads, a_0, a_s):
     k2 = e_f * blade.first_moment + cos_flap * blade.second_moment
     flap = (
         loads.normal_moment
-        - blade.flap_spring * pose.beta
+        - blade.flap_spring * (pose.beta - blade.flap_rest)
         - blade.first_moment * dot(basis.normal, a_0)
         - blade.second_moment * dot(basis.normal, a_s)
     )
@@ -207,11 +207,38 @@ def hinge_moments(blade, basis, pose, loads, a_0, a_s):
         k1 * a_0.y
         + k2 * a_s.y
         - (e_f * loads.forward_force + cos_flap * loads.forward_moment)
-        - blade.lag_spring * pose.xi
+        - blade.lag_spring * (pose.xi - blade.lag_rest)
         - blade.lag_damping * pose.xi_rate
     )
     lag_inertia = e_f * (k1 + cos_flap * blade.first_moment) + cos_flap * cos_flap * blade.second_moment
     return HingeMoments(flap, lag, 1.0 / lag_inertia)
+
+
+@kernel
+def with_axial_damper(blade, basis, pose, moments, pitch, pitch_rate):
+    """Hinge moments with those of an axial lag damper, eqs. (3.7) to (3.9).
+
+    Parameters
+    ----------
+    moments : HingeMoments
+    pitch, pitch_rate : lanes
+        At the hinge [rad, rad/s].
+    """
+    a, b, c, d, r = blade.damper_a, blade.damper_b, blade.damper_c, blade.damper_d, blade.damper_r
+    cos_lag, sin_lag = cosine_sine(pose.xi - blade.lag_rest)
+    cos_pitch, sin_pitch = cosine_sine(pitch)
+    cos_flap, sin_flap = basis.cos_flap, basis.span.z
+    along, across = b * cos_lag + d * sin_lag, d * cos_lag - b * sin_lag  # of the end on the blade
+    back, down = r * cos_pitch, r * sin_pitch  # of the end on the hub
+    x = c + (a * sin_flap + along * cos_flap)
+    y = across - back
+    z = a * cos_flap - along * sin_flap - down
+    inverse_length = inverse_root(x * x + y * y + z * z + TINY)
+    by_flap = rounded((z * c + x * down) * inverse_length)
+    by_lag = rounded((across * (x * cos_flap - z * sin_flap) - along * y) * inverse_length)
+    by_pitch = rounded((y * down - z * back) * inverse_length)
+    force = rounded(blade.damper_damping * (by_flap * pose.beta_rate + by_lag * pose.xi_rate + by_pitch * pitch_rate))
+    return HingeMoments(moments.flap - by_flap * force, moments.lag - by_lag * force, moments.inverse_lag_inertia)
 
 
 @kernel
@@ -287,7 +314,7 @@ def paper_moment(blade, basis, pose, loads):
     hinge = basis.lag_hinge + basis.flap_hinge
     moment = Vector(
         hinge.y * lift - basis.span.z * loads.forward_moment,
-        -(hinge.x * lift) - loads.normal_moment - blade.flap_spring * pose.beta,
+        -(hinge.x * lift) - loads.normal_moment - blade.flap_spring * (pose.beta - blade.flap_rest),
         ZERO,
     )
     flap_axis = Vector(ZERO, -1.0, ZERO)

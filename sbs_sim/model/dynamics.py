@@ -43,6 +43,7 @@ from sbs_sim.model.blade import (
     paper_moment,
     section_flow,
     to_blade,
+    with_axial_damper,
 )
 from sbs_sim.model.duct import duct_thrust
 from sbs_sim.model.frames import quaternion_rates, rotation, shaft_down
@@ -251,7 +252,7 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
         else:
             gravity = transposed(blade.axes) @ flight.gravity
             at_hinges, at_hub = -to_blade(blade, basis, gravity), Vector(0.0, 0.0, 0.0)
-        set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub)
+        set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub, swash, pitch)
         terms.u_t_hinge, terms.u_t_slope = flow.u_t_hinge, flow.u_t_slope
         terms.u_p_hinge, terms.u_p_slope = flow.u_p_hinge, flow.u_p_slope
         terms.pitch = pitch
@@ -298,7 +299,23 @@ def blade_pitch(aircraft, blade, pose, swash):
 
 
 @kernel
-def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub):
+def pitch_rate(aircraft, blade, pose, swash):
+    """Rate of the pitch of blades [rad/s], eq. (4.8) differentiated, with swashplates that stand still."""
+    angles, quad = aircraft.indices.swash, blade.quad
+    cosine = pose.cosine * blade.cos_phase - pose.sine * blade.sin_phase  # of psi_k + psi_s
+    sine = pose.sine * blade.cos_phase + pose.cosine * blade.sin_phase
+    lateral = spread(swash, angles[S.LATERAL], quad, blade)
+    longitudinal = spread(swash, angles[S.LONGITUDINAL], quad, blade)
+    by_azimuth = blade.sense * lateral * sine - longitudinal * cosine
+    return (
+        blade.rotor_speed * by_azimuth
+        - blade.pitch_flap_coupling * pose.beta_rate
+        - blade.pitch_lag_coupling * pose.xi_rate
+    )
+
+
+@kernel
+def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub, swash, pitch):
     """Set what a register r of blades has in the equations (5.6), and add it to the sums.
 
     `at_hinges` and `at_hub` are the known accelerations of the hub [m/s^2] in the moments about the hinges and in the
@@ -307,6 +324,8 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
     blade, terms = aircraft.blades[r], memory.terms[r]
     own = blade_accelerations(basis, motion)
     moments = hinge_moments(blade, basis, pose, loads, own.hinge + at_hinges, own.slope)
+    if aircraft.switches[0].axial_dampers == 1:
+        moments = with_axial_damper(blade, basis, pose, moments, pitch, pitch_rate(aircraft, blade, pose, swash))
     flap, lag = hinge_columns(blade, basis)
     flap, lag = about_cg(blade, basis, flap), about_cg(blade, basis, lag)
     known = about_cg(blade, basis, known_loads(blade, basis, loads, own.hinge + at_hub, own.slope))

@@ -119,6 +119,7 @@ def _quads(model: Model) -> list[list[int | None]]:
 # Fields that are zero for the blades that pad a quad: these have no mass, no stiffness and no lag.
 WEIGHTLESS = (
     *("mass", "first_moment", "hub_second_moment", "inverse_second_moment", "flap_spring", "lag_spring", "lag_damping"),
+    "damper_damping",
     *("lead_lag", "alternation"),
 )
 

@@ -23,7 +23,13 @@ QUAD = 4  # blades that are summed first, see `sbs_sim.lanes.memory`
 AIR = {"density": LANES, "inverse_viscosity": LANES, "gravity": LANES, "plate_areas": VECTOR}
 # the rigid part, about the c.g.: the fuselage without blades (`complete` coupling), or all of the aircraft (`paper`)
 BODY = {"mass": LANES, "first_moment": VECTOR, "inertia": MATRIX}
-SWITCHES = {"lead_lag": INTEGER, "cyclic_inflow": INTEGER, "complete_coupling": INTEGER, "complete_hub_moment": INTEGER}
+SWITCHES = {
+    "lead_lag": INTEGER,
+    "cyclic_inflow": INTEGER,
+    "complete_coupling": INTEGER,
+    "complete_hub_moment": INTEGER,
+    "axial_dampers": INTEGER,  # 1 where a rotor has them
+}
 ROTOR = {
     "rotor_speed": LANES,  # Omega
     "radius": LANES,  # R
@@ -60,7 +66,15 @@ BLADE = {
     "inverse_second_moment": LANES,  # 0 for what fills up a quad
     "flap_spring": LANES,
     "lag_spring": LANES,
+    "flap_rest": LANES,  # angles at which the springs exert no moment
+    "lag_rest": LANES,
     "lag_damping": LANES,
+    "damper_damping": LANES,  # of an axial damper [N s/m]
+    "damper_a": LANES,  # its linkage [m]
+    "damper_b": LANES,
+    "damper_c": LANES,
+    "damper_d": LANES,
+    "damper_r": LANES,
     "pitch_flap_coupling": LANES,
     "pitch_lag_coupling": LANES,
     "cos_phase": LANES,  # of the swashplate

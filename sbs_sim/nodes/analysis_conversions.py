@@ -65,7 +65,7 @@ def _mean_snapshot(aircraft: Aircraft, point: trim.TrimPoint) -> Snapshot:
     count = len(aircraft.rotors)
     state = trimmed_state(aircraft, point)
     engine = Engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
-    _, loads = engine.average(state, point.swashplate, azimuths(aircraft.layout.blades, point.azimuth_count))
+    _, loads = engine.average(state, point.swashplate, azimuths(aircraft.passages, point.azimuth_count))
     return Snapshot(
         step=0,
         time=0.0,

@@ -1,10 +1,11 @@
 """Floquet exponents beside the poles of the averaged model."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
-from helpers import build
+from helpers import TEST_STAND, WEIGHTLESS_VACUUM, build
 from scipy.linalg import expm
 
 from sbs_sim import linearize, trim
@@ -54,6 +55,39 @@ def test_differential_coordinates_change_sign_with_every_blade():
     found = floquet(aircraft, trim(aircraft), azimuth_count=96)
     assert found.period == pytest.approx(math.pi / aircraft.rotors[0].speed)
     assert found.difference.max() < 1e-9
+
+
+def test_a_rotor_without_one_of_its_lag_dampers(hover):
+    """Vacuum, a hub that nothing moves: every blade for itself decays by C / (2 A2), but for the one without a damper.
+
+    The averaged model gives every lag mode the mean of them, which is wrong: it has no mode without damping.
+    """
+    damping = 0.5
+    rotor = {"lag_damping": damping, "blade_lag_damping": [1.0, 1.0, 0.0]}
+    aircraft = build(environment=WEIGHTLESS_VACUUM, body=TEST_STAND, every_rotor=rotor)
+    still = dataclasses.replace(hover, state=np.zeros_like(hover.state), controls=np.zeros_like(hover.controls))
+    found = floquet(aircraft, still, azimuth_count=96)
+    own = aircraft.rotors[0]
+    assert found.period == pytest.approx(2.0 * math.pi / own.speed)  # a whole revolution
+    inertia = own.second_moment + own.flap_hinge_offset * (
+        own.blade_mass * own.flap_hinge_offset + 2.0 * own.first_moment
+    )
+    decay = -damping / (2.0 * inertia)
+    damped = np.sort(found.exponents.real[found.exponents.real < 0.25 * decay])
+    np.testing.assert_allclose(damped, decay, rtol=1e-3)
+    assert len(damped) == 2 * 2 * 2  # pairs of two blades of two rotors
+    averaged = found.poles.real[found.poles.real < 0.25 * decay]
+    np.testing.assert_allclose(averaged, 2.0 / 3.0 * decay, rtol=0.02)
+    assert len(averaged) == 2 * 2 * 3
+
+
+def test_models_of_unequal_blades_say_that_they_are_averages(sbs):
+    aircraft = sbs.with_value("rotors.MR1.blade_lag_damping", [1.0, 0.0, 1.0])
+    model = linearize(aircraft)
+    line = "MR1: blades with unequal lag dampers: this is a mean over a revolution, stability needs Floquet's method"
+    assert model.warnings == (line,)
+    assert linearize(sbs).warnings == ()
+    assert aircraft.passages == (1, 3)
 
 
 def test_period_is_common_to_all_rotors():

@@ -222,6 +222,60 @@ def test_fuselage_and_turning_blades_make_up_the_aircraft():
     np.testing.assert_allclose(inertia, aircraft.body.inertia, atol=1e-13)
 
 
+def test_tables_along_the_blade(sbs):
+    """Stations count from the axis, in shares of the radius; two points from hinge to tip are root and tip."""
+    hinge = 0.075 / 0.505
+    two = sbs.with_values(
+        {
+            "rotors.chord": {"stations": [hinge, 1.0], "values": [0.06, 0.04]},
+            "rotors.twist_deg": {"stations": [hinge, 1.0], "values": [10.0, -4.0]},
+        }
+    )
+    line = sbs.with_values({"rotors.chord": {"root": 0.06, "tip": 0.04}, "rotors.twist_deg": {"root": 10, "tip": -4}})
+    np.testing.assert_allclose(two.rotors[0].elements(20), line.rotors[0].elements(20), rtol=1e-13)
+    assert two.rotors[0].mean_chord == pytest.approx(0.05, rel=1e-14)
+    bent = {"stations": [0.0, 0.5, 0.8], "values": [0.02, 0.06, 0.03]}
+    rotor = sbs.with_value("rotors.chord", bent).rotors[0]
+    span, chord, *_ = rotor.elements(50)
+    radius = (0.075 + span) / 0.505
+    expected = np.where(radius < 0.5, 0.02 + 0.08 * radius, np.maximum(0.06 - 0.1 * (radius - 0.5), 0.03))
+    np.testing.assert_allclose(chord, expected, rtol=1e-12)
+    area = (0.02 + 0.08 * hinge + 0.06) / 2 * (0.5 - hinge) + 0.045 * 0.3 + 0.03 * 0.2
+    assert rotor.mean_chord == pytest.approx(area / (1 - hinge), rel=1e-12)
+    changed = sbs.with_value("rotors.chord", bent).with_value("rotors.MR1.chord.values[1]", 0.07)
+    assert [own.chord_values[1] for own in changed.rotors] == [0.07, 0.06]
+
+
+def test_mass_first_moment_and_inertia_of_a_blade_are_independent(sbs):
+    """UH-60A after Howlett, NASA CR-166309: no uniform blade has these three."""
+    blade = {"mass": 116.527879853, "first_moment": 385.66081570248, "inertia": 2050.8103068}
+    rotor = dataclasses.replace(
+        sbs.rotors[0],
+        radius=8.177784,
+        hinge_offset=0.381,
+        flap_hinge_offset=0.0,
+        flap_spring=0.0,
+        blade_mass=blade["mass"],
+        blade_cg=blade["first_moment"] / blade["mass"],
+        blade_inertia=blade["inertia"],
+    )
+    assert (rotor.first_moment, rotor.second_moment) == pytest.approx((blade["first_moment"], blade["inertia"]))
+    # 1 + e S / I = 1.07165 as in the report; its lag frequency is the root of the second part
+    assert 1 + rotor.hinge_offset * rotor.first_moment / rotor.second_moment == pytest.approx(1.07165, abs=5e-6)
+    uniform = dataclasses.replace(rotor, blade_inertia=None).second_moment
+    assert uniform == pytest.approx(116.527879853 * 7.796784**2 / 3)
+
+
+def test_a_given_inertia_counts_in_every_reading(sbs_paper):
+    """It takes the place of both choices of options.flap_inertia, in the equations and in the hub loads."""
+    assert sbs_paper.options.flap_inertia == "axis_to_tip"
+    given = sbs_paper.with_value("rotors.blade_inertia", 0.0123)
+    blade = given.model().blades[0]
+    assert blade["second_moment"][0] == blade["hub_second_moment"][0] == 0.0123
+    assert given.with_value("options.flap_inertia", "hinge_to_tip").model().blades[0]["second_moment"][0] == 0.0123
+    assert given.parameter_hash != sbs_paper.parameter_hash
+
+
 @pytest.mark.parametrize("count", [1, 7, 20])
 def test_elements_cover_the_blade(sbs, count):
     rotor = dataclasses.replace(
@@ -282,9 +336,24 @@ OTHER_VALUES = {
     ("rotors", 0, "blades"): 4,
     ("rotors", 0, "shaft_direction"): [0.1, 0.2, -0.9],
     ("rotors", 0, "lag_spring"): 3.0,
+    ("rotors", 0, "blade_inertia"): 0.0123,
+    ("rotors", 0, "blade_lag_damping"): [1.0, 0.0, 1.0],
+    ("rotors", 0, "flap_rest_deg"): 2.0,
+    ("rotors", 0, "lag_rest_deg"): -7.0,
     ("options", "elements"): 21,
 }
-OPTIONAL = {"speed_of_sound", "interpolation", "swashplate_offset_deg"}
+OPTIONAL = {
+    "speed_of_sound",
+    "interpolation",
+    "swashplate_offset_deg",
+    "blade_inertia",
+    "flap_rest_deg",
+    "lag_rest_deg",
+    "blade_lag_damping",
+    "lag_damper",
+    "stations",
+    "values",
+}
 NOT_IN_THE_MODEL = {
     "name",
     "description",
@@ -353,7 +422,13 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
         value = get(data, path)
     except KeyError:
         value = None
-        assert path[:3] == ("rotors", 0, "mixing") or path[2] in OPTIONAL, "a key that sbs.yaml does not show"
+        assert path[:3] == ("rotors", 0, "mixing") or OPTIONAL & set(path), "a key that sbs.yaml does not show"
+    if path[2:3] == ("lag_damper",):
+        data["rotors"][0]["lag_damper"] = {"c": 0.02, "d": 0.03}
+    if path[-1] in ("stations", "values"):
+        data["rotors"][0][path[2]] = {"stations": [0.2, 0.6, 1.0], "values": [0.05, 0.04, 0.03]}
+        aircraft, value = Aircraft.from_dict(data), get(data, path)
+        everything, arrays = flattened(aircraft), model_arrays(aircraft)
     put(data, path, other_value(path, value))
     aircraft = Aircraft.from_dict(data)
     assert flattened(aircraft) != everything
@@ -385,7 +460,7 @@ REFUSED = {
     "unknown nested key": (
         (*R1, "chord", "middle"),
         0.05,
-        "rotors[1].chord.middle: unknown key, allowed are root, tip",
+        "rotors[1].chord.middle: unknown key, allowed are root, tip, stations, values",
     ),
     "unknown control in a mixing": (
         (*R1, "mixing", "collective", "pedal"),
@@ -478,6 +553,38 @@ REFUSED = {
         (*R0, "blade_cg"),
         0.25,
         "rotors[0].blade_cg = 0.25: allowed is <= 0.248261, L/sqrt(3): the blade's second moment is m_b L^2/3",
+    ),
+    "inertia less than that of a point mass": (
+        (*R0, "blade_inertia"),
+        0.008,
+        "rotors[0].blade_inertia = 0.008: allowed is >= 0.00809339, blade_mass blade_cg^2",
+    ),
+    "factors of dampers of another number of blades": (
+        (*R0, "blade_lag_damping"),
+        [1.0, 0.0],
+        "rotors[0].blade_lag_damping = [1.0, 0.0]: allowed is a list of 3, one of each blade",
+    ),
+    "two ways to give the chord": (
+        (*R0, "chord", "stations"),
+        [0.0, 1.0],
+        "rotors[0].chord: has root, tip, stations, allowed are root and tip, or stations and values",
+    ),
+    "a table without values": ((*R1, "chord"), {"stations": [0.0, 1.0]}, "rotors[1].chord.values: missing key"),
+    "no twist": ((*R0, "twist_deg"), {}, "rotors[0].twist_deg: missing key"),
+    "a table of two lengths": (
+        (*R1, "chord"),
+        {"stations": [0.0, 1.0], "values": [0.05, 0.05, 0.04]},
+        "rotors[1].chord.values: allowed are 2 numbers, one of each station, not 3",
+    ),
+    "stations that do not increase": (
+        (*R0, "twist_deg"),
+        {"stations": [0.0, 0.5, 0.5], "values": [0.0, 1.0, 2.0]},
+        "rotors[0].twist_deg.stations = [0.0, 0.5, 0.5]: allowed are increasing numbers",
+    ),
+    "damper without a length": (
+        (*R0, "lag_damper"),
+        {"damping": 5.0},
+        "rotors[0].lag_damper.damping = 5.0: allowed is 0 where both ends of the damper are in one place",
     ),
     "no rotors": (("rotors",), [], "rotors = []: allowed is a list of at least 1"),
     "sense of rotation": ((*R0, "rotation"), 2, "rotors[0].rotation = 2: allowed is one of 1, -1"),

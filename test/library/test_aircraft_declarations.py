@@ -57,8 +57,18 @@ def test_the_schema_has_types_and_ranges():
     angle = {"type": "number", "minimum": -90, "maximum": 90}
     assert rotor["twist_deg"] == {
         "type": "object",
-        "properties": {"root": angle, "tip": angle},
-        "required": ["root", "tip"],
+        "properties": {
+            "root": angle,
+            "tip": angle,
+            "stations": {
+                "type": "array",
+                "items": {"type": "number", "minimum": 0, "maximum": 1},
+                "minItems": 2,
+                "maxItems": 200,
+            },
+            "values": {"type": "array", "items": angle, "minItems": 2, "maxItems": 200},
+        },
+        "required": [],
         "additionalProperties": False,
     }
     environment = schema["properties"]["environment"]

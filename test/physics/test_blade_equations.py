@@ -22,7 +22,10 @@ def odd_aircraft(rng, blades=3, **options):
             "hub": [rng.normal(scale=0.6, size=3) for _ in range(2)],
             "hinge_offset": 0.09,
             "flap_hinge_offset": 0.035,
+            "blade_inertia": [0.0121, None],
             "lag_spring": 25.0,
+            "flap_rest": 0.05,
+            "lag_rest": [-0.12, 0.08],
             "lag_damping": 0.4,
             "pitch_flap_coupling": 0.3,
             "pitch_lag_coupling": -0.2,
@@ -50,7 +53,8 @@ def largest_error(ac, rng, lead_lag=True):
             # The reading neglects the hub's acceleration: a body that moves so that the hub has none.
             om_dot = np.zeros(3)
             origin_acceleration = -np.cross(om, np.cross(om, rotor.hub))
-        inertia = rotor.blade_mass * rotor.radius**2 / 3 if ac.options.flap_inertia == "axis_to_tip" else None
+        to_axis = ac.options.flap_inertia == "axis_to_tip"
+        inertia = plain_model.flap_inertia(rotor, rotor.radius) if to_axis else None
         for k, blade in enumerate(instant.blades[j]):
             expected = blade_accelerations(
                 rotor,

@@ -1,5 +1,6 @@
 """The compiled derivative against the plain reference, and against closed forms (theory.md sections 2 to 7)."""
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -22,7 +23,8 @@ from helpers import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plain_model import multiblade_matrix, plain_derivative, random_state
+from plain_model import blade_azimuths, damper_length, multiblade_matrix, plain_derivative, random_state
+from scipy.optimize import brentq
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.model import records as R
@@ -33,8 +35,12 @@ from sbs_sim.model.multiblade import blade_matrix
 ODD_BLADE = {
     "hinge_offset": 0.09,
     "flap_hinge_offset": 0.035,
+    "blade_inertia": 0.0121,  # a uniform blade has 0.0093
     "lag_spring": 25.0,
+    "flap_rest_deg": 2.5,
+    "lag_rest_deg": -7.0,
     "lag_damping": 0.4,
+    "lag_damper": {"damping": 300.0, "a": 0.004, "b": 0.01, "c": 0.03, "d": 0.025, "r": 0.015},
     "pitch_flap_coupling": 0.3,
     "pitch_lag_coupling": -0.2,
     "chord": {"root": 0.06, "tip": 0.035},
@@ -116,6 +122,10 @@ AIRCRAFT = {
         "rotors": [{"blades": 7}, {"blades": 12}],
     },
     "tail_rotor": {"rotors": [{}, {"speed_rpm": 2300.0}, TAIL_ROTOR]},
+    "unequal_lag_dampers": {
+        "every_rotor": ODD_BLADE | {"blades": 4},
+        "rotors": [{"blade_lag_damping": [1.0, 0.0, 2.0, 0.5]}, {"lag_damper": {"damping": 0.0}}],
+    },
     "tandem": {"rotors": [{"hub": [0.9, 0.0, -0.1]}, {"hub": [-0.9, 0.0, -0.3]}]},
     "single_upside_down": {"rotors": [{"hub": [0.1, 0.2, 0.3], "shaft_direction": [0.0, 0.0, 1.0]}]},
     # every section at a Reynolds number beyond the table's, above and below
@@ -125,6 +135,12 @@ AIRCRAFT = {
     "thirteen_elements": {"options": {"elements": 13}},
     "sixty_four_elements": {"options": {"elements": 64}},
     "hundred_and_thirty_one_elements": {"options": {"elements": 131}, "every_rotor": ODD_BLADE},
+    "tables_along_the_blade": {
+        "rotors": [
+            {"chord": {"stations": [0.0, 0.3, 0.32, 0.9, 1.0], "values": [0.02, 0.05, 0.06, 0.055, 0.03]}},
+            {"twist_deg": {"stations": [0.25, 0.6, 0.94], "values": [8.0, 1.0, -6.0]}},
+        ]
+    },
     "two_airfoils": {"rotors": [{"airfoil": "linear_573"}, {"airfoil": "naca0012"}]},
     "central_hinges": {"every_rotor": {"hinge_offset": 0.0, "flap_hinge_offset": 0.0}},
     "vacuum": {"environment": {"air_density": 0.0}, "every_rotor": ODD_BLADE},
@@ -359,6 +375,33 @@ def test_lag_frequencies_in_vacuum(blades, lag_spring):
     np.testing.assert_allclose(found.real, 0, atol=1e-6)
 
 
+def test_springs_hold_blades_at_their_rest_angles():
+    """Vacuum: the centrifugal moments (e_0 S1 + A1 cos b) Omega^2 sin b and e_L k1 Omega^2 sin x hold the springs."""
+    model = Model(stand(flap_rest_deg=3.0, lag_rest_deg=-7.0, lag_spring=60.0, flap_hinge_offset=0.04))
+    rotor = model.aircraft.rotors[0]
+    s1, a1, _ = inertias(rotor)
+    e_f, e_l = rotor.flap_hinge_offset, rotor.hinge_offset - rotor.flap_hinge_offset
+    x, flap = model.state(), 0.0
+    for _ in range(60):  # flap and lag hang together by the cosines of both
+        stiffness = rotor.speed**2 * e_l * (rotor.blade_mass * e_f + s1 * np.cos(flap))
+        lag = brentq(lambda y, pull: rotor.lag_spring * (rotor.lag_rest - y) - pull * np.sin(y), -0.2, 0, (stiffness,))
+        arm = s1 * (e_l * np.cos(lag) + e_f)
+        flap = brentq(
+            lambda b, arm: (
+                rotor.flap_spring * (rotor.flap_rest - b) - rotor.speed**2 * np.sin(b) * (a1 * np.cos(b) + arm)
+            ),
+            0,
+            0.1,
+            (arm,),
+        )
+    x[model.layout.flap(0).start], x[model.layout.lag(0).start] = flap, lag
+    share = rotor.flap_spring / (a1 * (rotor.speed * flap_frequency(rotor)) ** 2)  # for small angles
+    assert flap == pytest.approx(share * rotor.flap_rest, rel=1e-2)
+    rates = model.derivative(x)
+    for part in (model.layout.flap_rate(0), model.layout.lag_rate(0)):
+        np.testing.assert_allclose(rates[part] / rotor.speed**2, 0.0, atol=1e-8)
+
+
 def test_lag_damper_damps_every_lag_mode():
     """A2 xi'' = -C xi': real part -C / (2 A2), the same seen from the body."""
     damping = 0.5
@@ -366,6 +409,74 @@ def test_lag_damper_damps_every_lag_mode():
     rotor = model.aircraft.rotors[0]
     found = mode_frequencies(model, model.layout.lag(0), model.layout.lag_rate(0))
     np.testing.assert_allclose(found.real, -damping / (2 * inertias(rotor)[2] * rotor.speed), rtol=1e-4)
+
+
+def test_lag_of_the_rotor_of_hammond():
+    """His blade (J. AHS 19 (4), 1974) has a free mass, first moment and inertia: nu^2 = e S / I = 0.28502^2."""
+    share, speed = 1e-6, 255 * np.pi / 30  # a millionth of the mass, so that the hub stands still
+    blade = {"blade_mass": 94.9 * share, "blade_cg": 289.1 / 94.9, "blade_inertia": 1084.7 * share}
+    hinges = {"hinge_offset": 0.3048, "flap_hinge_offset": 0.0, "flap_spring": 0.0, "lag_damping": 4067.5 * share}
+    model = Model(stand(blades=4, radius=6.0, speed_rpm=255.0, **blade, **hinges))
+    found = mode_frequencies(model, model.layout.lag(0), model.layout.lag_rate(0))
+    decay = 4067.5 / (2 * 1084.7 * speed)
+    np.testing.assert_allclose(found.real, -decay, rtol=1e-4)
+    np.testing.assert_allclose(found.imag, seen_from_the_body(math.sqrt(0.28502**2 - decay**2), 4), rtol=1e-4)
+
+
+def test_axial_damper_damps_by_the_square_of_its_lever():
+    """A damper across from c inboard to d ahead of the hinge: lever c d / sqrt(c^2 + d^2) about it."""
+    damping, inboard, ahead = 900.0, 0.03, 0.04
+    model = Model(stand(lag_damper={"damping": damping, "c": inboard, "d": ahead}))
+    rotor = model.aircraft.rotors[0]
+    found = mode_frequencies(model, model.layout.lag(0), model.layout.lag_rate(0))
+    rotational = damping * (inboard * ahead) ** 2 / (inboard**2 + ahead**2)
+    np.testing.assert_allclose(found.real, -rotational / (2 * inertias(rotor)[2] * rotor.speed), rtol=1e-4)
+
+
+def test_lever_of_the_lag_damper_of_the_uh60a():
+    """Linkage of NASA CR-166309: the lever at the spring's rest angle is the distance of the hinge from its line.
+
+    Without pitch and flap the line goes from (-c, r) to (b, d), along and ahead; a is the same height all along.
+    """
+    inch = 0.0254
+    a, b, c, d, r = (inch * length for length in (0.227, 3.242, 12.04, 10.0102, 6.898))
+    linkage = {"damping": 21890.854, "a": a, "b": b, "c": c, "d": d, "r": r}
+    model = Model(stand(blades=4, lag_damper=linkage, lag_spring=60.0))
+    rotor = model.aircraft.rotors[0]
+    x = model.state()
+    x[model.layout.lag_rate(0).start] = rate = 0.1
+    lever = (c * d + b * r) / math.hypot(b + c, d - r, a)
+    assert lever / inch == pytest.approx(9.16, abs=0.01)
+    without = Model(stand(blades=4, lag_spring=60.0)).derivative(x)
+    change = (model.derivative(x) - without)[model.layout.lag_rate(0).start]
+    assert change == pytest.approx(-21890.854 * lever**2 * rate / inertias(rotor)[2], rel=1e-5)
+
+
+def test_pitch_and_flap_move_the_axial_damper():
+    """The moments of its force are those of virtual work: the power that it takes is c times its rate squared."""
+    damper = ODD_BLADE["lag_damper"]
+    model = Model(stand(lag_damper=damper, swashplate_phase_deg=20.0))
+    rotor, layout = model.aircraft.rotors[0], model.layout
+    still = Model(stand(swashplate_phase_deg=20.0))
+    x, swash = model.state(), np.array([[0.1, 0.05, -0.07]])
+    x[layout.flap(0).start], x[layout.flap_rate(0).start] = 0.05, 3.0
+    x[layout.lag(0).start], x[layout.lag_rate(0).start] = 0.08, -2.0
+    psi = np.array([0.3])
+    lost = model.derivative(x, swash, psi) - still.derivative(x, swash, psi)
+    swing = blade_azimuths(rotor.blades, psi[0]) + rotor.swashplate_phase
+    pitch = 0.1 - 0.05 * np.cos(swing) + 0.07 * np.sin(swing)
+    rate = rotor.speed * (0.05 * np.sin(swing) + 0.07 * np.cos(swing))
+    lengths = [
+        [damper_length(rotor, 0.05 + 3.0 * t, 0.08 - 2.0 * t, pitch + rate * t) for t in (-1e-6, 1e-6)],
+        [damper_length(rotor, 0.05, 0.08 + t, pitch) for t in (-1e-6, 1e-6)],
+        [damper_length(rotor, 0.05 + t, 0.08, pitch) for t in (-1e-6, 1e-6)],
+    ]
+    axial, by_lag, by_flap = (np.subtract(after, before) / 2e-6 for before, after in lengths)
+    e_f, (s1, a1, _) = rotor.flap_hinge_offset, inertias(rotor)
+    a2 = rotor.blade_mass * e_f**2 + 2 * e_f * s1 * np.cos(0.05) + a1 * np.cos(0.05) ** 2
+    force = -damper["damping"] * axial
+    assert lost[layout.lag_rate(0).start] == pytest.approx(np.mean(by_lag * force) / a2, rel=1e-6)
+    assert lost[layout.flap_rate(0).start] == pytest.approx(np.mean(by_flap * force) / a1, rel=1e-6)
 
 
 @pytest.mark.parametrize("coordinate", ["flap", "lag"])

@@ -146,7 +146,7 @@ class Model:
     def averaged(self, x, swash=None, azimuth_count=12):
         """Return the averaged derivative, shape (size,), and the averaged loads, shape (n_rotors, LOAD_SIZE)."""
         swash = self.no_swash if swash is None else np.array(swash, dtype=float)
-        psi = azimuths(self.layout.blades, azimuth_count)
+        psi = azimuths(self.aircraft.passages, azimuth_count)
         rates, loads = self.points.average(np.array(x, dtype=float), swash, psi)
         return rates[: self.layout.size], loads
 

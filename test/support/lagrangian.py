@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import sympy as sp
+from plain_model import flap_inertia
 
 
 def _cross_matrix(vector):
@@ -26,7 +27,7 @@ def _equations():
     t, beta, xi, beta_d, xi_d = sp.symbols("t beta xi beta_d xi_d")
     psi, speed, g = sp.symbols("psi Omega G")
     e_0, e_f, m, s_1, a_1 = sp.symbols("e_0 e_F m S_1 A_1")
-    k_beta, k_xi, c_xi = sp.symbols("K_beta K_xi C_xi")
+    k_beta, k_xi, beta_0, xi_0, c_xi = sp.symbols("K_beta K_xi beta_0 xi_0 C_xi")
     velocity, acceleration, rate, rate_dot, hub, x_hub, y_hub, up, gravity = (
         sp.Matrix(sp.symbols(f"{name}:3")) for name in ("v", "a", "w", "wd", "h", "xh", "yh", "u", "g")
     )
@@ -49,7 +50,7 @@ def _equations():
 
     hinge_d, span_d = rate_of(hinge), rate_of(span)
     kinetic = (m * hinge_d.dot(hinge_d) + 2 * s_1 * hinge_d.dot(span_d) + a_1 * span_d.dot(span_d)) / 2
-    potential = (k_beta * beta**2 + k_xi * xi**2) / 2 - gravity.dot(m * hinge + s_1 * span)
+    potential = (k_beta * (beta - beta_0) ** 2 + k_xi * (xi - xi_0) ** 2) / 2 - gravity.dot(m * hinge + s_1 * span)
 
     angles, rates = (beta, xi), (beta_d, xi_d)
     now = {t: 0}
@@ -64,7 +65,7 @@ def _equations():
         force.append((-rest + kinetic.diff(angle) - potential.diff(angle) + damping).subs(now))
     jacobians = [part.diff(angle).subs(now) for part in (hinge, span) for angle in angles]
     arguments = [
-        *(beta, xi, beta_d, xi_d, psi, speed, g, e_0, e_f, m, s_1, a_1, k_beta, k_xi, c_xi),
+        *(beta, xi, beta_d, xi_d, psi, speed, g, e_0, e_f, m, s_1, a_1, k_beta, k_xi, beta_0, xi_0, c_xi),
         *(velocity, acceleration, rate, rate_dot, hub, x_hub, y_hub, up, gravity),
     ]
     return sp.lambdify(arguments, [mass, sp.Matrix(force), *jacobians], modules="numpy", cse=True)
@@ -92,7 +93,7 @@ def blade_accelerations(
     elements : iterable of (float, array of shape (3,))
         Stations from the flap hinge [m] and external forces there [N], body axes.
     second_moment : float, optional
-        In place of A1 = m_b L^2 / 3 [kg m^2].
+        In place of A1 of the rotor [kg m^2].
     lead_lag : bool
         Off: xi'' is zero as a constraint.
 
@@ -100,8 +101,7 @@ def blade_accelerations(
     -------
     tuple of two floats
     """
-    length = rotor.radius - rotor.hinge_offset
-    inertia = rotor.blade_mass * length**2 / 3 if second_moment is None else second_moment
+    inertia = flap_inertia(rotor) if second_moment is None else second_moment
     mass, force, *jacobians = _equations()(
         *angles,
         *rates,
@@ -115,6 +115,8 @@ def blade_accelerations(
         inertia,
         rotor.flap_spring,
         rotor.lag_spring,
+        rotor.flap_rest,
+        rotor.lag_rest,
         rotor.lag_damping,
         *body,
         rotor.hub,

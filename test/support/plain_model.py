@@ -155,6 +155,13 @@ def split_state(ac, x, lead_lag=True, cyclic_inflow=True):
 # ------------------------------------------------------------------------------------------------------------
 
 
+def flap_inertia(rotor, length=None):
+    """Return A1 [kg m^2]: that of the file, or of a uniform blade of a length [m], by default from the flap hinge."""
+    if rotor.blade_inertia is not None:
+        return rotor.blade_inertia
+    return rotor.blade_mass * (rotor.radius - rotor.hinge_offset if length is None else length) ** 2 / 3
+
+
 def mass_points(rotor, second_moment=None):
     """Return three point masses that carry a blade's m_b, S1 and A1.
 
@@ -173,7 +180,7 @@ def mass_points(rotor, second_moment=None):
     """
     length = rotor.radius - rotor.hinge_offset
     if second_moment is None:
-        second_moment = rotor.blade_mass * length**2 / 3
+        second_moment = flap_inertia(rotor)
     stations = np.array([0.0, length / 2, length])
     integrals = [rotor.blade_mass, rotor.blade_mass * rotor.blade_cg, second_moment]
     masses = np.linalg.solve(np.vander(stations, increasing=True).T, integrals)
@@ -384,6 +391,29 @@ def limited_slope(before, after):
     return np.sign(after) * min(abs(before + after) / 2, 3 * abs(before), 3 * abs(after))
 
 
+def along_blade(rotor, name, s):
+    """Return the chord [m] or twist [rad] at the station s from the flap hinge [m] (section 4.1)."""
+    stations, values = getattr(rotor, f"{name}_stations"), getattr(rotor, f"{name}_values")
+    if stations is None:
+        root, tip = getattr(rotor, f"{name}_root"), getattr(rotor, f"{name}_tip")
+        return root + (tip - root) * s / (rotor.radius - rotor.hinge_offset)
+    share = min(max((rotor.hinge_offset + s) / rotor.radius, stations[0]), stations[-1])
+    points = pairwise(zip(stations, values, strict=True))
+    (inner, first), (outer, last) = next(pair for pair in points if share <= pair[1][0])
+    return first + (last - first) * (share - inner) / (outer - inner)
+
+
+def hinge_pitch(blade, swash):
+    """Return the pitch at the hinge [rad] and its rate [rad/s] while the swashplate stands still (section 4.5)."""
+    rotor, swing = blade.rotor, blade.azimuth + blade.rotor.swashplate_phase
+    pitch = swash[0] - swash[1] * rotor.rotation * np.cos(swing) - swash[2] * np.sin(swing)
+    rate = rotor.speed * (swash[1] * rotor.rotation * np.sin(swing) - swash[2] * np.cos(swing))
+    return (
+        pitch - rotor.pitch_flap_coupling * blade.flap - rotor.pitch_lag_coupling * blade.lag,
+        rate - rotor.pitch_flap_coupling * blade.flap_rate - rotor.pitch_lag_coupling * blade.lag_rate,
+    )
+
+
 def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
     """Return the aerodynamic force of every element of a blade.
 
@@ -407,20 +437,11 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
     length = rotor.radius - rotor.hinge_offset
     edges = np.linspace(rotor.root_cutout, length, ac.options.elements + 1)
     lambda0, lambdas, lambdac = inflow
-    swing = blade.azimuth + rotor.swashplate_phase
     loads = []
     for inner, outer in pairwise(edges):
         s, ds = (inner + outer) / 2, outer - inner
-        chord = rotor.chord_root + (rotor.chord_tip - rotor.chord_root) * s / length
-        pitch = (
-            swash[0]
-            + rotor.twist_root
-            + (rotor.twist_tip - rotor.twist_root) * s / length
-            - swash[1] * rotor.rotation * np.cos(swing)
-            - swash[2] * np.sin(swing)
-            - rotor.pitch_flap_coupling * blade.flap
-            - rotor.pitch_lag_coupling * blade.lag
-        )
+        chord = along_blade(rotor, "chord", s)
+        pitch = hinge_pitch(blade, swash)[0] + along_blade(rotor, "twist", s)
         velocity = blade.velocity(s, air_velocity_hub)
         cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
         induced = rotor.speed * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
@@ -537,6 +558,7 @@ class Instant(NamedTuple):
     fuselage_moment: np.ndarray  # about the origin [N m]
     blades: list  # over rotors of lists of Blade
     air_loads: list  # over rotors, over blades, of lists of (s, force)
+    pitches: list  # over rotors, over blades, of pairs: pitch at the hinge [rad] and its rate [rad/s]
 
 
 def unpack(instant, unknowns):
@@ -580,7 +602,6 @@ def hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd, lag_dd):
     ac, rotor = instant.ac, instant.ac.rotors[j]
     hub_acceleration, alpha = hub_motion(instant, rotor, origin_acceleration, body_rate_dot)
     weight = np.zeros(3) if ac.options.coupling == "paper" else instant.gravity
-    length = rotor.radius - rotor.hinge_offset
     force, moment, paper_moment = np.zeros(3), np.zeros(3), np.zeros(3)
     for k, blade in enumerate(instant.blades[j]):
         for s, element_force in instant.air_loads[j][k]:
@@ -591,9 +612,9 @@ def hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd, lag_dd):
             a = blade.acceleration(s, hub_acceleration, alpha, flap_dd[k], lag_dd[k])
             force += point_mass * (weight - a)
             moment += cross(blade.position(s), point_mass * (weight - a))
-        paper_moment += rotor.flap_spring * blade.flap * blade.f
+        paper_moment += rotor.flap_spring * (blade.flap - rotor.flap_rest) * blade.f
         if instant.lead_lag:
-            paper_moment -= rotor.blade_mass * length**2 / 3 * flap_dd[k] * blade.f
+            paper_moment -= flap_inertia(rotor) * flap_dd[k] * blade.f
     if ac.options.hub_moment == "paper":
         u = np.asarray(rotor.shaft_direction, dtype=float)
         moment = paper_moment - u * (u @ paper_moment) + u * (u @ moment)
@@ -620,7 +641,7 @@ def hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, 
     """
     ac, rotor, blade = instant.ac, instant.ac.rotors[j], instant.blades[j][k]
     hub_acceleration, alpha = hub_motion(instant, rotor, origin_acceleration, body_rate_dot)
-    inertia = rotor.blade_mass * rotor.radius**2 / 3 if ac.options.flap_inertia == "axis_to_tip" else None
+    inertia = flap_inertia(rotor, rotor.radius) if ac.options.flap_inertia == "axis_to_tip" else None
     loads = list(instant.air_loads[j][k])
     for s, point_mass in mass_points(rotor, inertia):
         a = blade.acceleration(s, hub_acceleration, alpha, flap_dd, lag_dd)
@@ -629,9 +650,39 @@ def hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, 
     for s, load in loads:
         about_flap += cross(s * blade.d, load)
         about_lag += cross(blade.flap_arm + s * blade.d, load)
-    flap = blade.f @ about_flap - rotor.flap_spring * blade.flap
-    lag = -rotor.rotation * blade.u @ about_lag - rotor.lag_spring * blade.lag - rotor.lag_damping * blade.lag_rate
-    return flap, lag
+    flap = blade.f @ about_flap - rotor.flap_spring * (blade.flap - rotor.flap_rest)
+    lag = -rotor.rotation * blade.u @ about_lag - rotor.lag_spring * (blade.lag - rotor.lag_rest)
+    flap_damper, lag_damper = damper_moments(rotor, blade, instant.pitches[j][k])
+    factor = 1.0 if rotor.blade_lag_damping is None else rotor.blade_lag_damping[k]
+    return flap + factor * flap_damper, lag + factor * (lag_damper - rotor.lag_damping * blade.lag_rate)
+
+
+def damper_length(rotor, flap, lag, pitch):
+    """Return the length of the axial lag damper [m], from the places of its ends.
+
+    In axes that do not flap, lag or pitch, with their origin at the hinges: outboard, ahead, up. The end on the blade
+    is turned by lag about the last axis and then by flap about the second.
+    """
+    lag = lag - rotor.lag_rest
+    outboard = rotor.damper_b * np.cos(lag) + rotor.damper_d * np.sin(lag)
+    ahead = rotor.damper_d * np.cos(lag) - rotor.damper_b * np.sin(lag)
+    x = outboard * np.cos(flap) + rotor.damper_a * np.sin(flap) + rotor.damper_c
+    y = ahead - rotor.damper_r * np.cos(pitch)
+    z = rotor.damper_a * np.cos(flap) - outboard * np.sin(flap) - rotor.damper_r * np.sin(pitch)
+    return np.sqrt(x**2 + y**2 + z**2)
+
+
+def damper_moments(rotor, blade, pitch):
+    """Return the moments [N m] of the axial damper that raise flap and lag: force times length by angle.
+
+    `pitch` is a pair, the angle at the hinge [rad] and its rate [rad/s]; a complex step differentiates.
+    """
+    if rotor.damper_damping == 0:
+        return 0.0, 0.0
+    angles, rates = np.array([blade.flap, blade.lag, pitch[0]]), np.array([blade.flap_rate, blade.lag_rate, pitch[1]])
+    by_angle = np.array([damper_length(rotor, *(angles + 1e-30j * unit)).imag / 1e-30 for unit in np.eye(3)])
+    force = -rotor.damper_damping * (by_angle @ rates)
+    return by_angle[0] * force, by_angle[1] * force
 
 
 def residual(instant, unknowns):
@@ -707,6 +758,7 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
         fuselage_moment=part_moment,
         blades=blades,
         air_loads=air_loads,
+        pitches=[[hinge_pitch(blade, swash[j]) for blade in own] for j, own in enumerate(blades)],
     )
 
 
@@ -862,7 +914,8 @@ def energy(ac, x, psi):
         total = total + 0.5 * point_mass * velocity @ velocity
     for rotor, blades in zip(ac.rotors, make_blades(ac, state, psi), strict=True):
         for blade in blades:
-            total = total + 0.5 * (rotor.flap_spring * blade.flap**2 + rotor.lag_spring * blade.lag**2)
+            flap, lag = blade.flap - rotor.flap_rest, blade.lag - rotor.lag_rest
+            total = total + 0.5 * (rotor.flap_spring * flap**2 + rotor.lag_spring * lag**2)
     return total - ac.environment.gravity * first_moment(ac, x, psi)[2]
 
 
@@ -903,15 +956,21 @@ def table6_aircraft(environment=None, body=None, options=None, rotors=None):
         "blades": 3,
         "blade_mass": 0.1613,
         "blade_cg": 0.224,
+        "blade_inertia": None,
         "hinge_offset": 0.075,
         "flap_hinge_offset": 0.0075,
         "flap_spring": 162.0,
         "lag_spring": 0.0,
+        "flap_rest": 0.0,
+        "lag_rest": 0.0,
         "lag_damping": 0.0,
+        "blade_lag_damping": None,
+        **dict.fromkeys((f"damper_{name}" for name in ("damping", "a", "b", "c", "d", "r")), 0.0),
         "pitch_flap_coupling": 0.0,
         "pitch_lag_coupling": 0.0,
         "chord_root": 0.051,
         "chord_tip": 0.051,
+        **dict.fromkeys(("chord_stations", "chord_values", "twist_stations", "twist_values")),
         "twist_root": 0.0,
         "twist_tip": 0.0,
         "root_cutout": 0.0,

@@ -2,9 +2,9 @@
 # Made by tools/make_completion.py: do not edit.
 # shellcheck shell=bash disable=SC2207  # no completion has blanks in it
 
-_sbs_sim_names='simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep batch reproduce gusts plot'
+_sbs_sim_names='simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep batch reproduce validate gusts plot'
 _sbs_sim_own='build test shell python completion --help --version'
-_sbs_sim_aircraft='sbs sbs_paper'
+_sbs_sim_aircraft='castles_gray sbs sbs_paper'
 _sbs_sim_conditions='airspeed climb_rate sideslip_deg turn_rate_deg'
 _sbs_sim_paths='environment.air_density environment.kinematic_viscosity environment.gravity environment.speed_of_sound body.mass body.inertia body.flat_plate_areas options.coupling options.hub_moment options.flap_inertia options.elements options.interpolation controls.collective.range_deg controls.lateral_cyclic.range_deg controls.longitudinal_cyclic.range_deg controls.differential_longitudinal_cyclic.range_deg rotors.name rotors.hub rotors.shaft_direction rotors.rotation rotors.speed_rpm rotors.radius rotors.blades rotors.blade_mass rotors.blade_cg rotors.hinge_offset rotors.flap_hinge_offset rotors.flap_spring rotors.lag_spring rotors.lag_damping rotors.pitch_flap_coupling rotors.pitch_lag_coupling rotors.chord.root rotors.chord.tip rotors.twist_deg.root rotors.twist_deg.tip rotors.root_cutout rotors.tip_loss rotors.swashplate_phase_deg rotors.airfoil rotors.duct_expansion rotors.collective_range_deg rotors.cyclic_range_deg rotors.swashplate_rate_deg rotors.mixing.collective.collective rotors.mixing.collective.lateral_cyclic rotors.mixing.collective.longitudinal_cyclic rotors.mixing.collective.differential_longitudinal_cyclic rotors.mixing.lateral_cyclic.collective rotors.mixing.lateral_cyclic.lateral_cyclic rotors.mixing.lateral_cyclic.longitudinal_cyclic rotors.mixing.lateral_cyclic.differential_longitudinal_cyclic rotors.mixing.longitudinal_cyclic.collective rotors.mixing.longitudinal_cyclic.lateral_cyclic rotors.mixing.longitudinal_cyclic.longitudinal_cyclic rotors.mixing.longitudinal_cyclic.differential_longitudinal_cyclic'
 
@@ -18,6 +18,7 @@ _sbs_sim_options() {
         'sweep') echo '--help --version --values --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --guess-deg --trims-only --workers --dask --out --csv --json' ;;
         'batch') echo '--help --version --flights --duration --turbulence --length --seed --spread --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --workers --dask --every --out --csv --json' ;;
         'reproduce') echo '--help --version --aircraft --paper-aircraft --json --out' ;;
+        'validate') echo '--help --version --list --json --page --strict' ;;
         'gusts') echo '--help --version --aircraft --set --wind --turbulence --length --gust --gust-duration --seed --duration --delay --limit --json' ;;
         'plot') echo '--help --version --out --flight' ;;
     esac
@@ -25,7 +26,7 @@ _sbs_sim_options() {
 
 _sbs_sim_follows() {
     case $1 in
-        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'gusts --json' | 'plot' | 'plot --out') echo '@files' ;;
+        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'validate --json' | 'validate --page' | 'gusts --json' | 'plot' | 'plot --out') echo '@files' ;;
         'replay --set' | 'trim --set' | 'linearize --set' | 'sweep --set' | 'batch --spread' | 'batch --set' | 'gusts --set') echo '@assigned' ;;
         'trim --aircraft' | 'linearize --aircraft' | 'sweep --aircraft' | 'batch --aircraft' | 'reproduce --aircraft' | 'reproduce --paper-aircraft' | 'gusts --aircraft') echo '@aircraft' ;;
         'trim --method') echo 'newton two_loop' ;;

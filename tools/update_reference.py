@@ -380,6 +380,8 @@ def allowed(schema: Mapping[str, Any]) -> str:
         names, inner = list(schema["properties"]), next(iter(schema["properties"].values()))
         many = "for each of " if len(names) > 1 else ""
         return f"{many}{', '.join(f'`{name}`' for name in names)}: {allowed(inner)}"
+    if kind == "array" and "enum" in schema["items"]:
+        return f"any of {allowed(schema['items'])}"
     if kind == "array":
         sizes = []
         while schema["type"] == "array":

@@ -94,6 +94,14 @@ def test_hover_of_the_model_rotor(report):
     assert median < 0.06
 
 
+def test_ground_resonance_is_that_of_the_equations_of_the_plane(report):
+    """The same equations by another program: to the digits that are given."""
+    case = next(case for case in report.cases if case.name == "hammond")
+    eigenvalues = [row for row in case.rows if not row.quantity.startswith("undamped")]
+    assert max(abs(row.difference) for row in eigenvalues) < 1e-6
+    assert case.verdict == MET
+
+
 def test_the_page_of_the_documentation_is_current_but_for_its_numbers(report):
     from make_validation import NOTE, PAGE, without_numbers
 

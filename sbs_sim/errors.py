@@ -53,6 +53,10 @@ class ClusterError(SbsError):
     """A cluster that cannot be reached, or whose workers are not like this process."""
 
 
+class ValidationError(SbsError):
+    """A comparison with published results that cannot be made."""
+
+
 class ExportError(SbsError):
     """A file that cannot be written."""
 

@@ -384,6 +384,8 @@ def allowed(schema: Mapping[str, Any]) -> str:
             return "; ".join(f"`{name}` {allowed(part)}" for name, part in schema["properties"].items())
         many = "for each of " if len(names) > 1 else ""
         return f"{many}{', '.join(f'`{name}`' for name in names)}: {allowed(inner)}"
+    if kind == "array" and "enum" in schema["items"]:
+        return f"any of {allowed(schema['items'])}"
     if kind == "array":
         sizes = []
         while schema["type"] == "array":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sbs_sim.aircraft.description import TRIMMED_CONTROLS, Array, Range, Rotor
+from sbs_sim.aircraft.description import STAND_AXES, TRIMMED_CONTROLS, Array, Range, Rotor
 from sbs_sim.aircraft.part_consistency import part_problems
 from sbs_sim.model.state import CONTROL_NAMES, EULER_NAMES, SWASHPLATE_NAMES
 
@@ -76,11 +76,29 @@ def consistency_problems(aircraft: "Aircraft") -> list[str]:
     ]
     if problems:
         return problems
+    if aircraft.body.is_stand:  # in place of a body
+        return _stand_problems(aircraft)
     mass, _, inertia = aircraft.fuselage()
     if mass <= 0:
         blades = aircraft.body.mass - mass
         return [f"body.mass = {aircraft.body.mass}: allowed is > {blades:g}, the mass of all blades"]
     return _inertia_problems("body.inertia without the blades", inertia)
+
+
+def _stand_problems(aircraft: "Aircraft") -> list[str]:
+    """What a stand cannot be."""
+    body, options = aircraft.body, aircraft.options
+    problems = []
+    if options.coupling != "complete":
+        problems.append(f"options.coupling = {options.coupling!r}: allowed on a stand is complete only")
+    for i, axis in enumerate(STAND_AXES):
+        if body.stand_free[i] and body.stand_mass[i] <= 0:
+            problems.append(f"body.stand.mass[{i}] = {body.stand_mass[i]:g}: allowed is > 0, since {axis} is free")
+        if not body.stand_free[i]:
+            for key, values in (("spring", body.stand_spring), ("damping", body.stand_damping)):
+                if values[i]:
+                    problems.append(f"body.stand.{key}[{i}] = {values[i]:g}: allowed is 0, since {axis} is locked")
+    return problems
 
 
 def _inertia_problems(path: str, inertia: Array) -> list[str]:

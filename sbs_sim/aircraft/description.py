@@ -43,6 +43,7 @@ MAX_ROTORS, MAX_CONTROLS, MAX_SURFACES = 16, 16, 32
 MAX_CONTROL = 1e6  # of a control that is no angle, in its unit
 TRIMMED_CONTROLS = 4  # that a trim finds
 MAX_BLADES = 20
+STAND_AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
@@ -240,6 +241,22 @@ class Fuselage(ByContent):
     wash: Wash = part("Wash of a rotor", Wash, default={})
 
 
+def _free_axes() -> Any:
+    """Field with 1 for the axes of a stand that are named, 0 for the others, shape (6,)."""
+    schema = list_schema({"enum": list(STAND_AXES)}, 0, len(STAND_AXES)) | {"uniqueItems": True}
+    text = "Axes in which the stand lets the rotors move, the others are locked; all of them is free flight"
+
+    def flags(names: list[str]) -> Array:
+        return frozen([1.0 if axis in names else 0.0 for axis in STAND_AXES])
+
+    return declared(text, schema, flags, key="stand.free", default=list(STAND_AXES))
+
+
+def _of_stand(text: str, unit: str, name: str, symbol: str) -> Any:
+    """Field with a value for each axis of a stand."""
+    return array(text, 0, 1e9, unit, shape=(6,), key=f"stand.{name}", default=[0.0] * 6, symbol=symbol)
+
+
 @dataclass(frozen=True, eq=False)
 class Body(ByContent):
     """The whole aircraft, blades included."""
@@ -266,6 +283,27 @@ class Body(ByContent):
         f"Lifting surfaces, up to {MAX_SURFACES} of them", Surface, 0, MAX_SURFACES, default=[]
     )
     fuselage: Fuselage | None = part("Fuselage by tables, beside the flat plates", Fuselage, default=None)
+    stand_free: Array = _free_axes()
+    stand_mass: Array = _of_stand(
+        "Mass of a stand along x, y, z and inertia about them, in place of the body's, blades extra; 0 where locked",
+        "kg, kg m^2",
+        "mass",
+        r"\mathbf M_s",
+    )
+    stand_spring: Array = _of_stand(
+        "Stiffness of a stand along and about x, y, z, about the rest position at the origin",
+        "N/m, N m/rad",
+        "spring",
+        r"\mathbf K_s",
+    )
+    stand_damping: Array = _of_stand(
+        "Damping of a stand along and about x, y, z", "N s/m, N m s/rad", "damping", r"\mathbf C_s"
+    )
+
+    @property
+    def is_stand(self) -> bool:
+        """The rotors stand on something, and do not fly."""
+        return bool((self.stand_free == 0.0).any() or self.stand_mass.any())
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft.declaration import model_values
-from sbs_sim.aircraft.description import Rotor
+from sbs_sim.aircraft.description import Body, Rotor
 from sbs_sim.aircraft.surfaces import parts_of
 from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells
@@ -93,6 +93,7 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["complete_coupling"] = aircraft.options.coupling == "complete"
     switches["axial_dampers"] = any(rotor.damper_damping > 0.0 for rotor in aircraft.rotors)
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
+    switches["stand"] = aircraft.body.is_stand
     return switches
 
 
@@ -106,9 +107,26 @@ def _air(aircraft: "Aircraft") -> NDArray[Any]:
 def _body(aircraft: "Aircraft") -> NDArray[Any]:
     body = R.records(R.BODY, 1, 1)
     complete = aircraft.options.coupling == "complete"
+    if aircraft.body.is_stand:
+        _set(body[0], _stand(aircraft.body))
+        return body
     parts = aircraft.fuselage() if complete else (aircraft.body.mass, np.zeros(3), aircraft.body.inertia)
     _set(body[0], dict(zip(("mass", "first_moment", "inertia"), parts, strict=True)))
     return body
+
+
+def _stand(body: Body) -> dict[str, Any]:
+    """Values of a body that is a stand: its inertia is the fuselage's, its mass has a direction."""
+    return {
+        "inertia": np.diag(body.stand_mass[3:]),
+        "free": body.stand_free[:3],
+        "free_turn": body.stand_free[3:],
+        "stand_mass": body.stand_mass[:3],
+        "spring": body.stand_spring[:3],
+        "turn_spring": body.stand_spring[3:],
+        "damping": body.stand_damping[:3],
+        "turn_damping": body.stand_damping[3:],
+    }
 
 
 def second_moment(aircraft: "Aircraft", rotor: Rotor) -> float:

@@ -13,6 +13,7 @@ EXECUTABLES = {
     "sweep": ("sbs_sim.commands.sweep:main", "trims and modes along one parameter"),
     "batch": ("sbs_sim.commands.batch:main", "Monte Carlo: many flights through turbulence"),
     "reproduce": ("sbs_sim.commands.reproduce:main", "the paper's results beside ours"),
+    "validate": ("sbs_sim.commands.validate:main", "published results of others beside ours"),
     "gusts": ("sbs_sim.commands.gusts:main", "the hover hold, and how it holds in turbulence and gusts"),
     "plot": ("sbs_sim.commands.plot:main", "draw a log over time"),
     "simulator": ("sbs_sim.nodes.executables:simulator", "fly in real time (ROS 2)"),

@@ -192,7 +192,10 @@ def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
     set_hub_velocities(aircraft, memory, flight)
     loads = body_loads(aircraft, memory, flight)
     if aircraft.switches[0].complete_coupling == 1:
-        solve_with_blades(aircraft, memory, loads)
+        if aircraft.switches[0].stand == 1:
+            solve_on_stand(aircraft, memory, flight, loads)
+        else:
+            solve_with_blades(aircraft, memory, loads)
         solve_blades(aircraft, memory)
         if with_loads:
             set_hub_loads(aircraft, memory)
@@ -201,6 +204,8 @@ def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
         set_hub_loads(aircraft, memory)
         solve_body_alone(aircraft, memory, loads)
     set_body_rates(memory, flight, dx)
+    if aircraft.switches[0].stand == 1:
+        hold_locked_axes(aircraft, dx)
     set_rotor_rates(aircraft, memory, dx)
 
 
@@ -482,11 +487,30 @@ def solve_with_blades(aircraft, memory, loads):
     """Set specific force and angular acceleration of the body, all blades eliminated (`complete`), eq. (5.8)."""
     body, total = aircraft.body[0], memory.totals[aircraft.rotors.shape[0]]
     right = ForceMoment(loads.force + total.force, loads.moment + total.moment)
-    m, s, i = body.mass + total.mass, body.first_moment + total.first_moment, body.inertia
+    m = body.mass + total.mass
+    matrix = mass_matrix(body, total, Vector(m, m, m))
+    solved = solve_blocks(matrix.force, matrix.coupling, matrix.moment, right)
+    set_acceleration(memory, solved.force, solved.moment)
+
+
+class MassMatrix(NamedTuple):
+    """Matrix of eq. (5.8) by its blocks: force by force, moment by force, moment by moment."""
+
+    force: Any
+    coupling: Any
+    moment: Any
+
+
+@kernel
+def mass_matrix(body, total, mass):
+    """Left side of eq. (5.8); `mass` is that of everything along each axis [kg]."""
+    s, i = body.first_moment + total.first_moment, body.inertia
     e = symmetric(total.second_moment)
     # the sum of c c^T / A over the hinges, block by block
     h_force, h_coupling, h_moment = symmetric(total.hinge_mass), total.hinge_coupling, symmetric(total.hinge_inertia)
-    force_block = Symmetric(m - h_force.xx, m - h_force.yy, m - h_force.zz, -h_force.xy, -h_force.yz, -h_force.zx)
+    force_block = Symmetric(
+        mass.x - h_force.xx, mass.y - h_force.yy, mass.z - h_force.zz, -h_force.xy, -h_force.yz, -h_force.zx
+    )
     coupling_block = Matrix(
         Vector(-h_coupling.x.x, -s.z - h_coupling.x.y, s.y - h_coupling.x.z),
         Vector(s.z - h_coupling.y.x, -h_coupling.y.y, -s.x - h_coupling.y.z),
@@ -500,8 +524,81 @@ def solve_with_blades(aircraft, memory, loads):
         i.z.y - e.yz - h_moment.yz,
         i.z.x - e.zx - h_moment.zx,
     )
-    solved = solve_blocks(force_block, coupling_block, moment_block, right)
+    return MassMatrix(force_block, coupling_block, moment_block)
+
+
+@kernel
+def solve_on_stand(aircraft, memory, flight, loads):
+    """Set specific force and angular acceleration of rotors on a stand, eqs. (5.19) to (5.21)."""
+    body, total = aircraft.body[0], memory.totals[aircraft.rotors.shape[0]]
+    known = flight.gravity - cross(flight.omega, flight.velocity)  # U' is the specific force and this
+    matrix = mass_matrix(body, total, body.stand_mass + Vector(total.mass, total.mass, total.mass))
+    stand = stand_loads(body, memory.state, flight, known)
+    right = ForceMoment(loads.force + total.force + stand.force, loads.moment + total.moment + stand.moment)
+    still = Vector(1.0 - body.free.x, 1.0 - body.free.y, 1.0 - body.free.z)
+    solved = solve_locked(matrix, right, body.free, body.free_turn, -along(still, known))
     set_acceleration(memory, solved.force, solved.moment)
+
+
+@kernel
+def stand_loads(body, x, flight, known):
+    """Springs, dampers and inertial loads of a stand, eq. (5.19); its own weight is balanced at rest."""
+    place = transposed(flight.to_earth) @ S.vector_at(x, S.POSITION)
+    pull, momentum = along(body.spring, place), along(body.stand_mass, flight.velocity)
+    attitude = S.attitude_at(x)
+    turn = Vector(attitude.x, attitude.y, attitude.z)
+    twist = along(body.turn_spring, turn)
+    force = -(pull + along(body.damping, flight.velocity) + along(body.stand_mass, known))
+    moment = cross(place, pull) - (twist * attitude.w + cross(twist, turn)) * 2.0
+    return ForceMoment(
+        force - cross(flight.omega, momentum),
+        moment - along(body.turn_damping, flight.omega) - cross(flight.velocity, momentum),
+    )
+
+
+@kernel
+def along(factors, vector):
+    """Product axis by axis."""
+    return Vector(factors.x * vector.x, factors.y * vector.y, factors.z * vector.z)
+
+
+@kernel
+def solve_locked(matrix, right, free, free_turn, given):
+    """Solve for the free axes; the locked ones have `given` specific force and no angular acceleration, eq. (5.21)."""
+    force = along(free, right.force - times(matrix.force, given)) + given
+    moment = along(free_turn, right.moment - matrix.coupling @ given)
+    coupling = matrix.coupling
+    return solve_blocks(
+        free_block(matrix.force, free),
+        Matrix(
+            along(free, coupling.x) * free_turn.x,
+            along(free, coupling.y) * free_turn.y,
+            along(free, coupling.z) * free_turn.z,
+        ),
+        free_block(matrix.moment, free_turn),
+        ForceMoment(force, moment),
+    )
+
+
+@kernel
+def free_block(block, free):
+    """Symmetric matrix with the rows and columns of what is locked replaced by those of the identity."""
+    return Symmetric(
+        block.xx * free.x + (1.0 - free.x),
+        block.yy * free.y + (1.0 - free.y),
+        block.zz * free.z + (1.0 - free.z),
+        block.xy * (free.x * free.y),
+        block.yz * (free.y * free.z),
+        block.zx * (free.z * free.x),
+    )
+
+
+@kernel
+def hold_locked_axes(aircraft, dx):
+    """Keep the velocities of the locked axes of a stand."""
+    body = aircraft.body[0]
+    S.set_vector(dx, S.VELOCITY, along(body.free, S.vector_at(dx, S.VELOCITY)))
+    S.set_vector(dx, S.RATES, along(body.free_turn, S.vector_at(dx, S.RATES)))
 
 
 @kernel

@@ -22,13 +22,26 @@ QUAD = 4  # blades that are summed first, see `sbs_sim.lanes.memory`
 
 AIR = {"density": LANES, "inverse_viscosity": LANES, "gravity": LANES, "plate_areas": VECTOR}
 # the rigid part, about the c.g.: the fuselage without blades (`complete` coupling), or all of the aircraft (`paper`)
-BODY = {"mass": LANES, "first_moment": VECTOR, "inertia": MATRIX}
+BODY = {
+    "mass": LANES,
+    "first_moment": VECTOR,
+    "inertia": MATRIX,
+    # of a stand, along and about the axes of the body; 1 for what is free, 0 for what is locked
+    "free": VECTOR,
+    "free_turn": VECTOR,
+    "stand_mass": VECTOR,
+    "spring": VECTOR,
+    "turn_spring": VECTOR,
+    "damping": VECTOR,
+    "turn_damping": VECTOR,
+}
 SWITCHES = {
     "lead_lag": INTEGER,
     "cyclic_inflow": INTEGER,
     "complete_coupling": INTEGER,
     "complete_hub_moment": INTEGER,
     "axial_dampers": INTEGER,  # 1 where a rotor has them
+    "stand": INTEGER,
 }
 ROTOR = {
     "rotor_speed": LANES,  # Omega

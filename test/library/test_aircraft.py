@@ -23,6 +23,7 @@ from sbs_sim.errors import AircraftError
 from sbs_sim.model.state import CONTROL_NAMES, RATES, VELOCITY
 
 DATA = Path(__file__).resolve().parents[1] / "data"
+SHIPPED = sorted(path.stem for path in (config_folder() / "aircraft").glob("*.yaml"))
 SBS_TEXT = (config_folder() / "aircraft" / "sbs.yaml").read_text(encoding="utf-8")
 SCHEMA = json.loads((config_folder() / "aircraft.schema.json").read_text(encoding="utf-8"))
 AIRFOIL_NAMES = "linear_573, naca0012"
@@ -737,7 +738,7 @@ def test_a_bad_value_in_a_file_is_refused_with_the_file_named(tmp_path):
 def test_a_missing_file_is_refused_with_the_names_that_exist(name):
     with pytest.raises(AircraftError) as caught:
         Aircraft.load(name)
-    assert str(caught.value) == f"aircraft = {name!r}: allowed are a file's path or one of sbs, sbs_paper"
+    assert str(caught.value) == f"aircraft = {name!r}: allowed are a file's path or one of {', '.join(SHIPPED)}"
 
 
 # -- airfoils ---------------------------------------------------------------------------------------

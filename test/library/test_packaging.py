@@ -128,7 +128,8 @@ def test_everything_that_is_shipped_is_found_there(environment):
 
 def test_a_refusal_is_one_line_there_too(environment):
     result = call(environment, "python", "-m", "sbs_sim", "trim", "--aircraft", "nothing")
-    assert result.stderr == "aircraft = 'nothing': allowed are a file's path or one of sbs, sbs_paper\n"
+    shipped = ", ".join(sorted(path.stem for path in (ROOT / "config/aircraft").glob("*.yaml")))
+    assert result.stderr == f"aircraft = 'nothing': allowed are a file's path or one of {shipped}\n"
 
 
 def test_every_file_names_the_same_version():

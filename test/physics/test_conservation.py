@@ -249,6 +249,67 @@ def test_drives_and_dampers_account_for_the_energy():
     assert change == pytest.approx(work, abs=1e-8 * np.abs(powers).max() * steps * h)
 
 
+STANDS = {
+    "all_axes": {"mass": [30.0, 20.0, 10.0, 3.0, 4.0, 6.0], "spring": [900.0, 700.0, 500.0, 60.0, 80.0, 40.0]},
+    "gimbal": {"free": ["roll", "pitch"], "mass": [0, 0, 0, 3.0, 4.0, 0], "spring": [0, 0, 0, 60.0, 80.0, 0]},
+    "slide": {"free": ["x", "y"], "mass": [30.0, 9.0, 0, 0, 0, 0], "spring": [900.0, 700.0, 0, 0, 0, 0]},
+    "mixed": {"free": ["x", "yaw"], "mass": [30.0, 0, 0, 0, 0, 6.0], "spring": [900.0, 0, 0, 0, 0, 40.0]},
+}
+
+
+@pytest.mark.parametrize("name", STANDS)
+def test_energy_of_rotors_on_a_stand(name):
+    """The rate of the energy is the power of the drives less that of the dampers, with nothing left (section 5.10)."""
+    aircraft = build(
+        environment=VACUUM,
+        options={"elements": 1},
+        body={"stand": STANDS[name]},
+        rotors=ROTORS["tilted_four_and_five_blades"],
+    )
+    model = Model(aircraft)
+    x, psi = tumbling_state(model, 7), np.array([0.3, 1.1])
+    x[S.POSITION : S.ATTITUDE] *= 0.01
+    x[S.VELOCITY : S.BODY_SIZE] *= aircraft.body.stand_free  # locked axes are at rest
+    rate = model.derivative(x, psi=psi)
+    power = model.loads[:, R.TORQUE] @ model.speeds
+    for j, rotor in enumerate(aircraft.rotors):
+        rates = multiblade_matrix(rotor.blades, psi[j]) @ x[model.layout.lag_rate(j)]
+        rates += rotor.speed * multiblade_matrix(rotor.blades, psi[j], 1) @ x[model.layout.lag(j)]
+        power -= rotor.lag_damping * rates @ rates
+    tiny = 1e-30
+    found = energy(aircraft, x + 1j * tiny * rate, psi + 1j * tiny * model.speeds).imag / tiny
+    assert np.abs(rate[S.VELOCITY : S.BODY_SIZE])[aircraft.body.stand_free == 0].max(initial=0.0) == 0.0
+    assert abs(power) > 1.0
+    assert found == pytest.approx(power, rel=1e-10)
+
+
+def test_dampers_of_a_stand_take_energy():
+    """A stand without blades to speak of swings as a damped oscillator in every axis alone."""
+    stand = {"mass": [2.0] * 6, "spring": [50.0] * 6, "damping": [0.8] * 6}
+    light = {
+        "blade_mass": 1e-12,
+        "blade_cg": 0.1,
+        "flap_spring": 0.0,
+        "lag_damping": 0.0,
+        "hub": [0.0, 0.0, 0.0],
+        "speed_rpm": 30.0,
+    }
+    model = Model(build(environment=WEIGHTLESS_VACUUM, options={"elements": 1}, body={"stand": stand}, rotors=[light]))
+    for axis in range(6):
+        x, amplitude, time = model.state(), 1e-4, 0.7
+        if axis < 3:
+            x[S.POSITION + axis] = amplitude
+        else:
+            x[S.ATTITUDE + axis - 2] = amplitude / 2
+        steps = 400
+        x = model.fly(x, steps, time / steps)
+        decay = 0.8 / (2 * 2.0)
+        frequency = np.sqrt(50.0 / 2.0 - decay**2)
+        shape = np.cos(frequency * time) + decay / frequency * np.sin(frequency * time)
+        found = x[S.POSITION + axis] if axis < 3 else 2 * x[S.ATTITUDE + axis - 2]
+        assert found == pytest.approx(amplitude * np.exp(-decay * time) * shape, rel=1e-5)
+
+
 # -- symmetry in flight --------------------------------------------------------------------------------------
 
 ONE_SECOND = 2880  # steps of 5 deg at 2400 rpm

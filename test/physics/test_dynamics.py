@@ -109,6 +109,17 @@ PARTS = {
         "wash": {**WASH, "rotor": "R1"},
     },
 }
+STANDS = {
+    "all axes": {
+        "mass": [30.0, 20.0, 10.0, 3.0, 4.0, 6.0],
+        "spring": [900.0, 700.0, 500.0, 60.0, 80.0, 40.0],
+        "damping": [9.0, 7.0, 5.0, 0.6, 0.8, 0.4],
+    },
+    "in the plane": {"free": ["y", "x"], "mass": [30.0, 20.0, 0, 0, 0, 0], "spring": [900.0, 700.0, 0, 0, 0, 0]},
+    "gimbal": {"free": ["pitch", "roll"], "mass": [0, 0, 0, 3.0, 4.0, 0], "damping": [0, 0, 0, 0.6, 0.8, 0]},
+    "mixed": {"free": ["x", "pitch", "yaw"], "mass": [30.0, 0, 0, 0, 4.0, 2.0], "spring": [900.0, 0, 0, 0, 8.0, 0]},
+    "locked": {"free": []},
+}
 AIRCRAFT = {
     "sbs": {},
     "sbs_paper": {"name": "sbs_paper"},
@@ -146,6 +157,7 @@ AIRCRAFT = {
     "vacuum": {"environment": {"air_density": 0.0}, "every_rotor": ODD_BLADE},
     "surfaces_and_fuselage": {"body": PARTS, "rotors": TILTED},
     "surfaces_and_paper_coupling": {"name": "sbs_paper", "body": PARTS},
+    **{f"stand, {name}": {"body": {"stand": stand}, "every_rotor": ODD_BLADE} for name, stand in STANDS.items()},
 }
 SWITCHES = [(True, True), (False, True), (True, False), (False, False)]
 

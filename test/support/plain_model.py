@@ -187,6 +187,11 @@ def mass_points(rotor, second_moment=None):
     return list(zip(stations, masses, strict=True))
 
 
+def stands(ac):
+    """Return whether the rotors stand on something (section 5.10)."""
+    return getattr(ac.body, "is_stand", False)
+
+
 def body_mass(ac):
     """Return mass, first moment and inertia, about the body origin, of what the body's equations carry.
 
@@ -203,6 +208,8 @@ def body_mass(ac):
     inertia : array, shape (3, 3)
         [kg m^2], body axes, about the origin.
     """
+    if stands(ac):
+        return 0.0, np.zeros(3), np.diag(ac.body.stand_mass[3:])
     mass, first_moment, inertia = ac.body.mass, np.zeros(3), np.array(ac.body.inertia, dtype=float)
     if ac.options.coupling == "paper":
         return mass, first_moment, inertia
@@ -559,6 +566,7 @@ class Instant(NamedTuple):
     blades: list  # over rotors of lists of Blade
     air_loads: list  # over rotors, over blades, of lists of (s, force)
     pitches: list  # over rotors, over blades, of pairs: pitch at the hinge [rad] and its rate [rad/s]
+    state: object  # `split_state`
 
 
 def unpack(instant, unknowns):
@@ -721,7 +729,29 @@ def residual(instant, unknowns):
         hinges += [flap for flap, _ in pairs]
         if instant.lead_lag:
             hinges += [lag for _, lag in pairs]
+    if stands(ac):
+        force, moment = on_stand(instant, force, moment, origin_acceleration, body_rate_dot)
     return np.concatenate([force, moment, hinges])
+
+
+def on_stand(instant, force, moment, origin_acceleration, body_rate_dot):
+    """Return what is left of the equations of a stand: of a locked axis its acceleration, else loads and inertia.
+
+    The kinetic energy of the mass is (M v) v / 2; the springs have the energy (K r) r / 2 + 2 (K q) q, where r is the
+    deflection in axes of the body and q the vector part of the attitude.
+    """
+    body, state = instant.ac.body, instant.state
+    v, om, w, q = state.velocity, state.rate, state.quaternion[0], state.quaternion[1:]
+    r = rotation_matrix(state.quaternion).T @ state.position
+    velocity_rate = origin_acceleration - cross(om, v)
+    masses, springs, dampers = body.stand_mass[:3], body.stand_spring, body.stand_damping
+    force = force - masses * velocity_rate - cross(om, masses * v) - springs[:3] * r - dampers[:3] * v
+    moment = moment - cross(v, masses * v) + cross(r, springs[:3] * r) - dampers[3:] * om
+    moment = moment - 2 * (w * springs[3:] * q + cross(springs[3:] * q, q))
+    return (
+        np.where(body.stand_free[:3] > 0, force, velocity_rate),
+        np.where(body.stand_free[3:] > 0, moment, body_rate_dot),
+    )
 
 
 def solve_accelerations(instant):
@@ -759,6 +789,7 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
         blades=blades,
         air_loads=air_loads,
         pitches=[[hinge_pitch(blade, swash[j]) for blade in own] for j, own in enumerate(blades)],
+        state=state,
     )
 
 
@@ -916,6 +947,10 @@ def energy(ac, x, psi):
         for blade in blades:
             flap, lag = blade.flap - rotor.flap_rest, blade.lag - rotor.lag_rest
             total = total + 0.5 * (rotor.flap_spring * flap**2 + rotor.lag_spring * lag**2)
+    if stands(ac):
+        r = rotation_matrix(state.quaternion).T @ state.position
+        q, springs = state.quaternion[1:], ac.body.stand_spring
+        total = total + 0.5 * (ac.body.stand_mass[:3] * v @ v + springs[:3] * r @ r) + 2 * springs[3:] * q @ q
     return total - ac.environment.gravity * first_moment(ac, x, psi)[2]
 
 

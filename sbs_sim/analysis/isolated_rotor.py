@@ -1,0 +1,246 @@
+"""One rotor on a hub that moves steadily, or on a stand that gives way (theory.md section 8.4)."""
+
+from __future__ import annotations  # `help` then shows types by their names
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim import checks
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.newton import newton
+from sbs_sim.content import ByContent
+from sbs_sim.errors import TrimError
+from sbs_sim.flight.engine import points_engine
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition
+from sbs_sim.model import records as R
+from sbs_sim.model import state as S
+from sbs_sim.model.average import azimuths
+from sbs_sim.model.dynamics import derivative
+from sbs_sim.model.frames import euler_to_quaternion
+from sbs_sim.model.steady import steady_balance
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+ANGLE_STEP, RATE_STEP = 1e-5, 1e-3  # of the differences: rad or inflow ratio, rad/s
+START_INFLOW = 0.02  # of the tip speed
+# in the state, along and about x, y, z: position, and the vector part of the attitude, half the angle
+DEFLECTIONS = np.array([S.POSITION, S.POSITION + 1, S.POSITION + 2, S.ATTITUDE + 1, S.ATTITUDE + 2, S.ATTITUDE + 3])
+LIMITS = {"airspeed": (-400.0, 400.0, "m/s"), "climb_rate": (-400.0, 400.0, "m/s"), "pitch": (-1.5, 1.5, "rad")}
+
+
+@dataclass(frozen=True, eq=False)
+class RotorPoint(ByContent):
+    """Steady motion of a rotor.
+
+    Attributes
+    ----------
+    swashplate : ndarray, shape (3,)
+        Collective, lateral and longitudinal cyclic pitch [rad].
+    state : ndarray, shape (size,)
+        Simulation state, with the hub's velocity and attitude in its body part.
+    places : ndarray of int64, shape (n,)
+        Indices in it of the unknowns: deflections of a stand, flap, lag where it moves, inflow.
+    thrust, torque : float
+        Mean thrust [N] and shaft torque [N m], which drives where it is positive.
+    force, moment : ndarray, shape (3,)
+        Mean load on the hub, body axes [N, N m].
+    thrust_coefficient, torque_coefficient : float
+        C_T = T / (rho A (Omega R)^2), C_Q = Q / (rho A (Omega R)^2 R); NaN in vacuum.
+    residual : float
+        Largest of the equations, scaled as those of a trim.
+    """
+
+    swashplate: Array
+    state: Array
+    places: IntArray
+    thrust: float
+    torque: float
+    force: Array
+    moment: Array
+    thrust_coefficient: float
+    torque_coefficient: float
+    residual: float
+
+
+class IsolatedRotor:
+    """The equations of the only rotor of an aircraft, its hub in steady straight flight.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+        With one rotor. Its body has no part in it, unless it is a stand: then its free axes move.
+    fidelity : Fidelity, optional
+
+    Raises
+    ------
+    TrimError
+        The aircraft has several rotors.
+    """
+
+    def __init__(self, aircraft: Aircraft, fidelity: Fidelity | None = None) -> None:
+        checks.instance("aircraft", aircraft, Aircraft, TrimError)
+        if len(aircraft.rotors) != 1:
+            raise TrimError(f"rotors: {len(aircraft.rotors)} of them; allowed is one that stands alone")
+        self.aircraft, self.fidelity = aircraft, fidelity or Fidelity()
+        self.rotor, self.layout = aircraft.rotors[0], aircraft.layout
+        self._free = np.flatnonzero(aircraft.body.stand_free) if aircraft.body.is_stand else np.zeros(0, dtype=np.int64)
+        self._azimuths = azimuths(self.layout.blades, self.fidelity.azimuth_count)
+        self.places, self.rate_places = self._unknowns()
+        self._scales = np.where(self.rate_places < self.layout.inflow(0).start, self.rotor.speed**2, self.rotor.speed)
+        self._scales[self.rate_places < S.BODY_SIZE] = max(aircraft.environment.gravity, 1.0)
+
+    def _unknowns(self) -> tuple[IntArray, IntArray]:
+        """Indices of the unknowns, and of their equations in the rate of the state: accelerations, inflow rates."""
+        index, layout = np.arange(self.layout.size), self.layout
+        inflow = index[layout.inflow(0)][: 3 if self.fidelity.cyclic_inflow else 1]
+        lag = (index[layout.lag(0)], index[layout.lag_rate(0)]) if self.fidelity.lead_lag else (index[:0], index[:0])
+        sprung = self._free[self.aircraft.body.stand_spring[self._free] > 0.0]
+        places = np.concatenate([DEFLECTIONS[sprung], index[layout.flap(0)], lag[0], inflow])
+        return places, np.concatenate([S.VELOCITY + sprung, index[layout.flap_rate(0)], lag[1], inflow])
+
+    def steady(
+        self,
+        swashplate: Sequence[float],
+        airspeed: float = 0.0,
+        climb_rate: float = 0.0,
+        pitch: float = 0.0,
+        *,
+        start: RotorPoint | None = None,
+    ) -> RotorPoint:
+        """Flap, lag and inflow whose mean rates vanish.
+
+        Parameters
+        ----------
+        swashplate : sequence of 3 floats
+            Collective, lateral and longitudinal cyclic pitch [rad].
+        airspeed, climb_rate : float
+            Of the hub: horizontal ahead, and up [m/s].
+        pitch : float
+            Of the body, nose up [rad]: with the shaft along -z it is the angle by which the disc is tilted aft.
+        start : RotorPoint, optional
+            Where to begin.
+
+        Raises
+        ------
+        TrimError
+            A value out of range, or no steady motion is found.
+        """
+        given = {"airspeed": airspeed, "climb_rate": climb_rate, "pitch": pitch}
+        for name, value in given.items():
+            low, high, unit = LIMITS[name]
+            checks.number(name, value, low, high, unit, TrimError)
+        if len(self._free) and pitch:
+            raise TrimError(f"pitch = {pitch:g} rad: allowed is 0 on a stand that gives way, whose rest is level")
+        x, swash = self._flight(airspeed, climb_rate, pitch), np.array(swashplate, dtype=float)
+        if start is None:
+            x[self.layout.inflow(0).start] = START_INFLOW
+        else:
+            x = _with(x, self.places, start.state[start.places])
+
+        def residual(values: Array) -> Array:
+            return np.asarray(self._mean(_with(x, self.places, values), swash)[0][self.rate_places] / self._scales)
+
+        found = newton(residual, x[self.places])
+        if not found.converged:
+            raise TrimError(
+                f"no steady motion of {self.rotor.name}: largest residual {np.abs(found.residual).max():.3g}"
+            )
+        return self._point(_with(x, self.places, found.values), swash, float(np.abs(found.residual).max()))
+
+    def _flight(self, airspeed: float, climb_rate: float, pitch: float) -> Array:
+        """State of the hub with the rotor's states zero."""
+        x = np.zeros(self.layout.size)
+        x[S.ATTITUDE : S.ATTITUDE + 4] = euler_to_quaternion(0.0, pitch, 0.0)
+        x[S.VELOCITY : S.RATES], _ = TrimCondition(airspeed, climb_rate).motion(pitch, 0.0)
+        return x
+
+    def _point(self, x: Array, swash: Array, residual: float) -> RotorPoint:
+        loads = self._mean(x, swash)[1]
+        rotor, density = self.rotor, self.aircraft.environment.air_density
+        tip_speed = rotor.speed * rotor.radius
+        pressure = density * np.pi * rotor.radius**2 * tip_speed**2
+        thrust, torque = float(loads[R.THRUST]), float(loads[R.TORQUE])
+        return RotorPoint(
+            swashplate=swash,
+            state=x,
+            places=self.places,
+            thrust=thrust,
+            torque=torque,
+            force=loads[R.FORCE : R.FORCE + 3].copy(),
+            moment=loads[R.MOMENT : R.MOMENT + 3].copy(),
+            thrust_coefficient=thrust / pressure if pressure else np.nan,
+            torque_coefficient=torque / (pressure * rotor.radius) if pressure else np.nan,
+            residual=residual,
+        )
+
+    def _mean(self, x: Array, swash: Array) -> tuple[Array, Array]:
+        """Mean rate of a state over the azimuth, and mean loads."""
+        rates, loads = self._rates([x] * len(self._azimuths), swash, self._azimuths)
+        return rates.mean(axis=0), loads.mean(axis=0)
+
+    def _rates(self, states: Sequence[Array], swash: Array, psi: Array) -> tuple[Array, Array]:
+        """Rates (m, size) and loads (m, 8) of states at as many azimuths; the hub accelerates on a stand alone."""
+        engine = points_engine(self.aircraft.arranged(self.fidelity.lead_lag, self.fidelity.cyclic_inflow, "points"))
+        rates, loads = np.empty((len(states), self.layout.size)), np.empty((len(states), R.LOAD_SIZE))
+        angles, still_air, left = engine.lanes([swash]), engine.memory(3), engine.memory(6)
+        for first in range(0, len(states), engine.n):
+            part = slice(first, min(first + engine.n, len(states)))
+            count, slopes = part.stop - part.start, engine.tick.slopes[0]
+            given, places = engine.lanes(list(states[part])), engine.lanes(list(psi[part]))
+            if len(self._free):
+                derivative(engine.model, given, angles, places, still_air, engine.work, slopes, True)
+            else:
+                steady_balance(engine.model, given, angles, places, still_air, engine.work, slopes, left)
+            rates[part], loads[part] = slopes[:, :count].T, engine.work.load_rows[:, :count].T
+        return rates, loads
+
+    def matrix(self, point: RotorPoint, *, inflow: bool = True) -> tuple[Array, tuple[str, ...]]:
+        """System matrix of the rotor with its hub held, or on its stand, averaged over the azimuth.
+
+        Parameters
+        ----------
+        point : RotorPoint
+            Of this rotor.
+        inflow : bool
+            False holds the inflow.
+
+        Returns
+        -------
+        a : ndarray, shape (n, n)
+        names : tuple of str
+            Of its n states, those of the simulation state: deflections of a stand (in rotation half the angles),
+            angles, velocities of the stand, rates of the angles, inflow.
+        """
+        layout, index = self.layout, np.arange(self.layout.size)
+        is_inflow = self.places >= layout.inflow(0).start
+        deflections = DEFLECTIONS[self._free]
+        angles = self.places[~is_inflow & (self.places >= S.BODY_SIZE)]
+        flap, lag = index[layout.flap_rate(0)], index[layout.lag_rate(0)]
+        rates = np.concatenate([flap, lag]) if self.fidelity.lead_lag else flap
+        velocities, inflows = S.VELOCITY + self._free, self.places[is_inflow] if inflow else index[:0]
+        used = np.concatenate([deflections, angles, velocities, rates, inflows])
+        steps = np.where(np.isin(used, rates), RATE_STEP * self.rotor.speed, ANGLE_STEP)
+        columns = [
+            self._mean(_moved(point.state, i, step), point.swashplate)[0]
+            - self._mean(_moved(point.state, i, -step), point.swashplate)[0]
+            for i, step in zip(used, steps, strict=True)
+        ]
+        a = np.stack([column[used] / (2.0 * step) for column, step in zip(columns, steps, strict=True)], axis=1)
+        return a, tuple(layout.names[i] for i in used)
+
+
+def _with(x: Array, places: IntArray, values: Array) -> Array:
+    """A state with some of its values changed."""
+    changed = x.copy()
+    changed[places] = values
+    turn = changed[S.ATTITUDE + 1 : S.ATTITUDE + 4]
+    changed[S.ATTITUDE] = np.sqrt(1.0 - turn @ turn)
+    return changed
+
+
+def _moved(x: Array, place: int, step: float) -> Array:
+    return _with(x, np.array([place]), x[place] + step)

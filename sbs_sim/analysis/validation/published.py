@@ -1,0 +1,18 @@
+"""What others have published, read from config/validation."""
+
+from functools import cache
+from typing import Any
+
+from sbs_sim.config_file import config_folder, read_yaml
+
+
+@cache
+def data(name: str) -> dict[str, Any]:
+    """File of a case, as it is.
+
+    Raises
+    ------
+    UnreadableError
+        It cannot be read.
+    """
+    return dict(read_yaml(config_folder() / "validation" / f"{name}.yaml"))

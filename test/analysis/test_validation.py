@@ -1,0 +1,157 @@
+"""Published results beside ours: what is compared, how it is judged, and the pages that show it."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import build
+from markup import HOSTILE, shown_as_text
+
+from sbs_sim import Aircraft
+from sbs_sim.analysis.isolated_rotor import IsolatedRotor
+from sbs_sim.analysis.validation import CASES, Aim, Case, Report, compared, data, validate
+from sbs_sim.analysis.validation.comparison import COMPARED, MET, MISSED, spread
+from sbs_sim.analysis.validation.formats import markdown, page_text
+from sbs_sim.errors import TrimError, ValidationError
+from sbs_sim.flight.trim_point import Fidelity
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+PATIENCE = 300.0  # s
+
+
+@pytest.fixture(scope="module")
+def report():
+    return validate()
+
+
+def made_case(*rows):
+    return Case("made", "Made <b>up</b>", "nobody", "none", ("a | b",), rows, ("because",))
+
+
+ROWS = (
+    compared("a", "here", 2.0, 2.19, "m", Aim(share=0.1, absolute=0.01, why="tenth")),
+    compared("b", "here", 2.0, 2.21, "m", Aim(share=0.1, absolute=0.01, why="tenth")),
+    compared("c", "here", 0.0, 0.5, "m", Aim(absolute=0.5)),
+    compared("d", "here", -4.0, -3.0, "m"),
+    compared("e", "here", 1.0, math.nan, "m", Aim(share=0.5)),
+)
+
+
+def test_a_row_is_judged_by_the_larger_of_its_two_aims_and_no_solution_is_a_miss():
+    assert [row.verdict for row in ROWS] == [MET, MISSED, MET, COMPARED, MISSED]
+    assert ROWS[3].relative_difference == 0.25
+    assert math.isnan(ROWS[2].relative_difference)
+
+
+def test_a_case_is_met_when_no_row_is_missed():
+    assert made_case(*ROWS).verdict == MISSED
+    assert made_case(ROWS[0], ROWS[3]).verdict == MET
+    assert made_case(ROWS[3]).verdict == COMPARED
+
+
+def test_the_spread_is_that_of_the_relative_differences():
+    median, worst = spread([ROWS[0], ROWS[1], ROWS[2], ROWS[3]])
+    assert (median, worst) == pytest.approx((0.105, 0.25))
+    assert math.isnan(spread(ROWS)[1])  # one has no solution
+
+
+def test_texts_are_never_markup():
+    case = Case("made", HOSTILE, HOSTILE, HOSTILE, (HOSTILE,), (compared(HOSTILE, HOSTILE, 1.0, 1.0, HOSTILE),))
+    made = Report(HOSTILE, (case,))
+    assert shown_as_text(page_text(made))
+
+
+def test_every_case_states_its_source_and_what_an_aim_comes_from(report):
+    assert [case.name for case in report.cases] == list(CASES)
+    for case in report.cases:
+        assert case.source == data(case.name)["source"]
+        assert case.statement
+        assert case.rows
+        assert all(row.aim.why for row in case.rows if row.aim)
+        if case.verdict == MISSED:
+            assert case.remarks, f"{case.name} misses an aim and says nothing"
+
+
+def test_the_eigenvalues_of_the_inflow_are_the_closed_form(report):
+    case = next(case for case in report.cases if case.name == "pitt_peters")
+    for row in case.rows:
+        exact = -1.5 * math.pi if row.quantity.startswith("uniform") else -45.0 * math.pi / 16.0
+        assert row.ours == pytest.approx(exact, rel=2e-5)
+
+
+def test_hover_of_the_model_rotor(report):
+    """The least that any blade-element model with momentum inflow must do on these tests."""
+    case = next(case for case in report.cases if case.name == "castles_gray")
+    thrust = [row for row in case.rows if row.quantity == "C_T"]
+    assert sum(row.verdict == MET for row in thrust) >= len(thrust) - 2
+    median, _ = spread(row for row in thrust if row.published > 0.001)
+    assert median < 0.06
+
+
+def test_ground_resonance_is_that_of_the_equations_of_the_plane(report):
+    """The same equations by another program: to the digits that are given."""
+    case = next(case for case in report.cases if case.name == "hammond")
+    eigenvalues = [row for row in case.rows if not row.quantity.startswith("undamped")]
+    assert max(abs(row.difference) for row in eigenvalues) < 1e-6
+    assert case.verdict == MET
+
+
+def test_the_page_of_the_documentation_is_current_but_for_its_numbers(report):
+    from make_validation import NOTE, PAGE, without_numbers
+
+    assert without_numbers(PAGE.read_text(encoding="utf-8")) == without_numbers(NOTE + markdown(report))
+
+
+def test_an_unknown_case_is_refused():
+    with pytest.raises(ValidationError, match=r"^case = 'nothing': allowed"):
+        validate(["nothing"])
+
+
+def test_the_command_writes_what_the_library_computes(tmp_path):
+    command = [str(ROOT / "run"), "validate", "pitt_peters", "--strict", "--json", str(tmp_path / "all.json")]
+    command += ["--page", str(tmp_path / "page.html")]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert result.returncode == 0, result.stderr
+    written = json.loads((tmp_path / "all.json").read_text())
+    assert [row["verdict"] for row in written["cases"][0]["rows"]] == [MET] * 6
+    assert "Eigenvalues of the inflow in hover" in result.stdout
+    assert "Eigenvalues of the inflow in hover" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+# --- one rotor on a hub that does not accelerate ----------------------------------------------------------------
+
+
+def test_thrust_of_a_rotor_in_hover_and_its_inflow_obey_momentum_theory():
+    """C_T = 2 lambda0^2 of an open rotor (theory.md section 6)."""
+    point = IsolatedRotor(Aircraft.load("castles_gray"), Fidelity(lead_lag=False)).steady((0.14, 0.0, 0.0))
+    inflow = point.state[-3:]
+    assert point.thrust_coefficient == pytest.approx(2.0 * inflow[0] ** 2, rel=1e-6)
+    assert inflow[1:] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_the_matrix_of_a_rotor_in_vacuum_has_the_frequencies_of_its_blades():
+    """Flap about a central hinge turns with the rotor: 0, Omega and 2 Omega in the fixed frame."""
+    craft = Aircraft.load("castles_gray").with_values({"environment.air_density": 0.0, "environment.gravity": 0.0})
+    rotor = IsolatedRotor(craft, Fidelity(lead_lag=False))
+    matrix, names = rotor.matrix(rotor.steady((0.0, 0.0, 0.0)), inflow=False)
+    found = sorted(abs(value.imag) for value in np.linalg.eigvals(matrix))
+    speed = craft.rotors[0].speed
+    assert names == ("a0(1)", "a1(1)", "b1(1)", "da0(1)", "da1(1)", "db1(1)")
+    assert [value / speed for value in found] == pytest.approx([0.0, 0.0, 1.0, 1.0, 2.0, 2.0], abs=1e-5)
+
+
+def test_an_aircraft_with_several_rotors_is_no_isolated_rotor(sbs):
+    with pytest.raises(TrimError, match="rotors: 2 of them"):
+        IsolatedRotor(sbs)
+
+
+def test_a_rotor_far_beyond_its_stall_or_speed_is_refused_in_a_line():
+    rotor = IsolatedRotor(build("castles_gray"))
+    with pytest.raises(TrimError, match=r"^airspeed = "):
+        rotor.steady((0.1, 0.0, 0.0), airspeed=1e9)

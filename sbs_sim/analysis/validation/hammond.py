@@ -50,12 +50,17 @@ def _eigenvalue_rows(speed: float, published: list[list[float]]) -> list[Row]:
 def eigenvalues(values: dict[str, float | list[float]]) -> NDArray[np.complex128]:
     """Eigenvalues [1/s] of the aircraft hammond with values changed."""
     rotor = IsolatedRotor(Aircraft.load("hammond").with_values(values), ONE_AZIMUTH)
-    return np.linalg.eigvals(rotor.matrix(rotor.steady((0.0, 0.0, 0.0)), inflow=False)[0])
+    matrix = rotor.matrix(rotor.steady((0.0, 0.0, 0.0)), inflow=False)[0]
+    return np.linalg.eigvals(matrix).astype(np.complex128)
 
 
 def _growth(speed: float) -> float:
     """Fastest growth without any damper [1/s]."""
-    undamped = {"rotors.lag_damping": 0.0, "body.stand.damping": [0.0] * 6, "rotors.speed_rpm": float(speed)}
+    undamped: dict[str, float | list[float]] = {
+        "rotors.lag_damping": 0.0,
+        "body.stand.damping": [0.0] * 6,
+        "rotors.speed_rpm": float(speed),
+    }
     return float(eigenvalues(undamped).real.max()) - GROWS
 
 

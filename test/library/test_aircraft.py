@@ -318,7 +318,7 @@ def schema_leaves(schema, path=()):
 
 
 # in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py
-ELSEWHERE = ("altitude", "temperature_offset", "surfaces", "fuselage")
+ELSEWHERE = ("stand", "altitude", "temperature_offset", "surfaces", "fuselage")
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)
@@ -450,7 +450,7 @@ def test_every_key_is_demanded_but_those_with_a_default_and_factors_of_mixing():
 
 # -- what is refused, and how it is said ------------------------------------------------------------
 
-BODY_KEYS = "mass, inertia, flat_plate_areas, surfaces, fuselage"
+BODY_KEYS = "mass, inertia, flat_plate_areas, surfaces, fuselage, stand"
 TOO_LONG = "x" * 300
 R0 = ("rotors", 0)
 R1 = ("rotors", 1)

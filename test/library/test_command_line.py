@@ -218,7 +218,12 @@ COMPLETED = {
     "./run trim --set body.mas": ["body.mass="],
     "./run batch --airspeed 5 --spread rotors.blade_m": ["rotors.blade_mass="],
     "./run sweep turn": ["turn_rate_deg"],
-    "./run sweep rotors.chord.": ["rotors.chord.root", "rotors.chord.tip"],
+    "./run sweep rotors.chord.": [
+        "rotors.chord.root",
+        "rotors.chord.tip",
+        "rotors.chord.stations",
+        "rotors.chord.values",
+    ],
     "./run simulator --ros-args -p azi": ["azimuth_step_deg:="],
     "./run cockpit --ros-args -p alt": ["altitude:="],
     "./run hover_hold --ros-args -p pat": ["patience:="],

@@ -261,7 +261,10 @@ def test_a_bar_is_shown_on_a_terminal_only():
 # -- errors ----------------------------------------------------------------------------------------------------------
 
 FAILURES = {
-    "unknown aircraft": (("trim", "--aircraft", "sb"), "aircraft = 'sb': allowed are a file's path or one of sbs, "),
+    "unknown aircraft": (
+        ("trim", "--aircraft", "sb"),
+        "aircraft = 'sb': allowed are a file's path or one of castles_gray, ",
+    ),
     "unknown key": (("trim", "--set", "body.mas=1"), "body.mas: unknown key, allowed are mass, inertia, "),
     "bad value": (("linearize", "--set", "body.mass=heavy"), "body.mass = 'heavy': allowed is a number"),
     "not finite": (("trim", "--set", "body.mass=NaN"), "body.mass = nan: allowed is a finite number"),

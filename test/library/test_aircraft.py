@@ -1026,7 +1026,7 @@ def test_an_aircraft_of_a_relative_path_can_be_changed_from_elsewhere(tmp_path, 
     assert list(aircraft.with_value("rotors.airfoil", "wing").airfoils) == ["wing"]
 
 
-KEYS_OF_BODY = "unknown key, allowed are mass, inertia, flat_plate_areas, surfaces, fuselage"
+KEYS_OF_BODY = "unknown key, allowed are mass, inertia, flat_plate_areas, surfaces, fuselage, stand"
 REFUSED_VALUES = {
     "unknown key": ("body.mas", 1.0, f"body.mas: {KEYS_OF_BODY}"),
     "unknown part": ("bodi.mass", 1.0, "bodi: unknown key, allowed are name, description, environment, "),

@@ -189,7 +189,7 @@ class Simulation:
         Raises
         ------
         SimulationError
-            See `reset`, `set_swashplate`.
+            See `reset`, `set_swashplate`, `fail_engine`.
         """
         if event.state is not None and event.swashplate is not None:
             self.reset(event.state, event.swashplate)
@@ -197,6 +197,8 @@ class Simulation:
             self.set_swashplate(event.swashplate)
         if event.wind is not None:
             self.set_wind(event.wind)
+        if event.drive:
+            self.fail_engine(event.drive, event.failure)
 
     def checked_state(self, state: ArrayLike) -> Array:
         """Copy of a simulation state that is complete, finite and plausible.

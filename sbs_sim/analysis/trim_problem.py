@@ -260,11 +260,20 @@ def _drive_unknowns(drive: Drive, speed: float, own: dict[str, float]) -> dict[s
     """Unknowns of the states of a drive; of one that stands still those with which a trim begins."""
     if own[S.SPEED] == 0.0:
         begin = {S.SPEED: drive.set_point - 1.0 if drive.has_governor else 0.0, S.ENGINE_TORQUE: HALF}
-        begin[S.GOVERNOR] = HALF - drive.throttle
+        begin[S.GOVERNOR] = _throttle(drive, speed) - drive.throttle
         return {name: begin[name] for name in own}
     scaled = {S.SPEED: own[S.SPEED] / speed - 1.0, S.ENGINE_TORQUE: own.get(S.ENGINE_TORQUE, 0.0)}
     scaled[S.ENGINE_TORQUE] /= drive.max_torque or 1.0
     return {name: scaled.get(name, value) for name, value in own.items()}
+
+
+def _throttle(drive: Drive, speed: float) -> float:
+    """Throttle that gives about half the largest torque at a speed [rad/s]: there no limit is in the way of a trim."""
+    if drive.engine != "electric":
+        return HALF
+    current = HALF * drive.max_torque / drive.torque_constant
+    voltage = drive.torque_constant * speed + drive.resistance * current
+    return min(voltage / drive.full_voltage, 1.0) if drive.full_voltage > 0.0 else HALF
 
 
 def _drive_states(drive: Drive, speed: float, own: dict[str, float]) -> dict[str, float]:

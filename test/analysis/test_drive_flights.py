@@ -1,6 +1,7 @@
 """Trim, linear models and flights of aircraft with drives (theory.md section 7.6)."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -57,6 +58,18 @@ def test_autorotation_is_the_flight_of_a_constant_speed_that_takes_no_torque():
     # of second order in the waves of the speed, which three blades make in forward flight
     np.testing.assert_allclose(same.torque, 0.0, atol=1e-4)
     np.testing.assert_allclose(point.controls, same.controls, atol=1e-5)
+
+
+def test_electric_hover():
+    """The motor's equations hold at the trim that is found, though throttle and free-wheel have ends with no slope."""
+    aircraft = Aircraft.load(Path(__file__).resolve().parents[1] / "data" / "electric.yaml")
+    point = trim(aircraft)
+    assert point["Omega(1)"] == pytest.approx(NOMINAL, rel=1e-10)
+    current = point["engine_torque(1)"] / 0.15
+    assert 50.0 * point["governor(1)"] == pytest.approx(0.15 * NOMINAL + 0.05 * current, rel=1e-9)
+    flown = simulate(aircraft, point, point.controls, 1.0, method="rk4")
+    amperes = np.mean(flown["engine_torque(1)"]) / 0.15 * point["governor(1)"]
+    assert flown["discharge(1)"][-1] == pytest.approx(amperes / (16.0 * 3600.0), rel=1e-3)
 
 
 def test_what_cannot_hover_has_no_trim():

@@ -123,6 +123,18 @@ def test_equations_are_those_of_the_plain_model_at_the_same_speeds(lead_lag):
     np.testing.assert_allclose(model.loads[:, R.MOMENT : R.MOMENT + 3], loads["moment"], rtol=1e-8, atol=1e-7)
 
 
+def test_blades_or_flights_in_the_lanes_give_the_same_bits():
+    """As for the aircraft without drives, see `sbs_sim.lanes`."""
+    engine = {"kind": "electric", "max_torque": 8.0, "torque_constant": 0.1, "throttle": 0.5}
+    aircraft = driven([{**DRIVES[0], "engine": engine, "governor": GOVERNOR}, DRIVES[1]], ROTORS, elements=5)
+    found = []
+    for lanes in ("blades", "points"):
+        model = Model(aircraft, lanes=lanes)
+        x = tumbling_state(model, [230.0, -90.0], inflow=0.05)
+        found.append(model.derivative(x, np.full((3, 3), 0.05), PSI).tobytes() + model.loads.tobytes())
+    assert found[0] == found[1]
+
+
 @pytest.mark.parametrize("lead_lag", [True, False])
 def test_momentum_and_energy_of_a_tumbling_aircraft(lead_lag):
     """Drives that turn freely in vacuum: momentum and energy to 1e-9, one of them backwards."""

@@ -40,6 +40,7 @@ BODY_BALANCES = (
     "yawing moment",
 )
 DRIVE_BALANCES = {S.SPEED: "torque of a drive", S.ENGINE_TORQUE: "throttle", S.GOVERNOR: "speed of a governor"}
+DROOP = 1e-6  # share of the speed that a governor may lack
 HALF = 0.5  # of torque and throttle: where trims begin
 
 
@@ -253,7 +254,19 @@ class TrimProblem:
         rows = engine.memory(engine.rotors, WORKING_SIZE)
         working_state(engine.model, engine.work, rows)
         unequal = (f"{rotor.name}: {UNEQUAL_BLADES}" for rotor in self.aircraft.rotors if not rotor.has_equal_blades)
-        return (*warnings(self.aircraft, rows[..., :count].mean(axis=-1)), *unequal)
+        return (*warnings(self.aircraft, rows[..., :count].mean(axis=-1)), *unequal, *self._droops(x))
+
+    def _droops(self, x: Array) -> list[str]:
+        """Governors that cannot hold their speed, a line each."""
+        found = []
+        for i, drive in enumerate(self.aircraft.drives):
+            places, speed = self.layout.drive(i), self.aircraft.drive_speed(i)
+            if drive.has_governor:
+                missing = drive.set_point - x[places[S.SPEED]] / speed
+                wanted = drive.throttle + x[places[S.GOVERNOR]] + drive.proportional_gain * missing
+                if abs(missing) > DROOP and not 0.0 <= wanted <= 1.0:
+                    found.append(f"drive {i + 1}: throttle at its end, speed {missing:.1%} below its set point")
+        return found
 
 
 def _drive_unknowns(drive: Drive, speed: float, own: dict[str, float]) -> dict[str, float]:

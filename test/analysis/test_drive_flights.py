@@ -72,6 +72,16 @@ def test_electric_hover():
     assert flown["discharge(1)"][-1] == pytest.approx(amperes / (16.0 * 3600.0), rel=1e-3)
 
 
+def test_a_motor_that_lacks_voltage_droops():
+    """At full throttle torque and speed are on the motor's line, below the set point, and the trim warns of it."""
+    aircraft = Aircraft.load(Path(__file__).resolve().parents[1] / "data" / "electric.yaml")
+    point = trim(aircraft.with_values({"drives[0].battery.full_voltage": 42.0, "drives[0].engine.resistance": 0.2}))
+    speed, torque = point["Omega(1)"], point["engine_torque(1)"]
+    assert pytest.approx(0.15 * speed + 0.2 * torque / 0.15, rel=1e-9) == 42.0
+    assert point.warnings[-1] == f"drive 1: throttle at its end, speed {1 - speed / NOMINAL:.1%} below its set point"
+    assert trim(aircraft).warnings == ()
+
+
 def test_what_cannot_hover_has_no_trim():
     """Without an engine hover is refused with a reason."""
     with pytest.raises(TrimError, match="no trim"):

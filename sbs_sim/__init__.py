@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from sbs_sim.analysis.linearize import linearize
     from sbs_sim.analysis.sweep import Sweep, sweep
     from sbs_sim.analysis.trim import trim
+    from sbs_sim.flight.engine_failure import EngineFailure
     from sbs_sim.flight.simulate import simulate
     from sbs_sim.flight.simulation import Simulation
     from sbs_sim.flight.trim_point import TrimPoint
@@ -27,6 +28,7 @@ _HOME = {
     "Batch": "sbs_sim.analysis.batch",
     "Case": "sbs_sim.analysis.batch",
     "simulate_batch": "sbs_sim.analysis.batch",
+    "EngineFailure": "sbs_sim.flight.engine_failure",
     "LinearModel": "sbs_sim.analysis.linear_model",
     "linearize": "sbs_sim.analysis.linearize",
     "Sweep": "sbs_sim.analysis.sweep",
@@ -40,6 +42,7 @@ __all__ = [
     "Aircraft",
     "Batch",
     "Case",
+    "EngineFailure",
     "LinearModel",
     "Simulation",
     "Sweep",

@@ -222,6 +222,10 @@ class FlightLoop:
         """Set the wind that `make` gives for the present instant, from the next tick on."""
         self.call(lambda: self._set_wind(make))
 
+    def fail_engine(self, drive: int, share: float) -> None:
+        """Let an engine lose a share of its torque from the next tick on, see `Simulation.fail_engine`."""
+        self.call(lambda: self._fail_engine(drive, share))
+
     def begin_log(self) -> None:
         """Hand out the present as a start, and as a snapshot: what a log that begins now has to begin with."""
         self.call(self._begin_log)
@@ -381,6 +385,10 @@ class FlightLoop:
         simulation = self._simulation
         simulation.set_wind(make(simulation.snapshot()))
         self._events.append(Event(simulation.step, "wind", wind=simulation.wind))
+
+    def _fail_engine(self, drive: int, share: float) -> None:
+        self._simulation.fail_engine(drive, share)
+        self._events.append(Event(self._simulation.step, "engine_failure", drive=drive, failure=share))
 
     def _reset(self, state: ArrayLike, swashplate: ArrayLike) -> None:
         simulation = self._simulation

@@ -376,6 +376,10 @@ def allowed(schema: Mapping[str, Any]) -> str:
         return ", ".join(f"`{item}`" for item in schema["enum"])
     if kind == "string":
         return "text"
+    if kind == "boolean":
+        return "`true`, `false`"
+    if kind == "array" and schema["items"].get("type") == "string":
+        return f"list of {schema['minItems']} to {schema['maxItems']} texts"
     if kind == "object":
         if "properties" not in schema:
             return f"by name: {allowed(schema['additionalProperties'])}"

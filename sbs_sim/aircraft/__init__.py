@@ -21,7 +21,7 @@ from sbs_sim.aircraft.airfoils import load_tables
 from sbs_sim.aircraft.consistency import consistency_problems, table_problems
 from sbs_sim.aircraft.declaration import cached_by_class, declarations, frozen, schema_of, values_of
 from sbs_sim.aircraft.description import Array, Description, Range, Rotor
-from sbs_sim.aircraft.model_records import model_of, with_fidelity
+from sbs_sim.aircraft.model_records import drive_of, first_rotor, gear, model_of, with_fidelity
 from sbs_sim.aircraft.paths import (
     Location,
     check_path,
@@ -40,7 +40,7 @@ from sbs_sim.model.frames import ONE, hub_axes
 from sbs_sim.model.mixing import mixed
 from sbs_sim.model.packing import by_blades, lane_count, side_by_side
 from sbs_sim.model.records import Model
-from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, StateLayout
+from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, SPEED, StateLayout
 
 MAX_CHANGES_SHOWN = 5  # in a refusal
 TYPICAL_ANGLE = 0.3  # rad; the range of a control that is no angle counts as that in trims
@@ -59,6 +59,7 @@ class Aircraft(Description):
     controls : tuple of Control
         Pilot controls: those of the paper's aircraft in its order, then others in that of the file.
     rotors : tuple of Rotor
+    drives : tuple of Drive
     tables : tuple of AirfoilTable
         Section data of each rotor's blades; one object for rotors that have the same.
     data : dict
@@ -199,7 +200,9 @@ class Aircraft(Description):
     @cached_property
     def layout(self) -> StateLayout:
         """Indices and names of the states of this aircraft."""
-        return StateLayout(tuple(rotor.blades for rotor in self.rotors))
+        return StateLayout(
+            tuple(rotor.blades for rotor in self.rotors), tuple(drive.state_names for drive in self.drives)
+        )
 
     @cached_property
     def passages(self) -> tuple[int, ...]:
@@ -215,7 +218,7 @@ class Aircraft(Description):
         to the declarations later do not change the hash of older files.
         """
         digest = hashlib.sha256()
-        for part in (self.environment, self.body, self.options, *self.rotors):
+        for part in (self.environment, self.body, self.options, *self.rotors, *self.drives):
             self._digest_part(digest, part)
         if self.control_names != CONTROL_NAMES or any(c.held is not None or not c.is_angle for c in self.controls):
             for control in self.controls:
@@ -376,6 +379,29 @@ class Aircraft(Description):
             inertia -= _blades_inertia(rotor)
         return mass, first, inertia
 
+    def drive_speed(self, drive: int) -> float:
+        """Speed in the file of the first rotor of a drive [rad/s], which is the scale of its speed and of its gears."""
+        return first_rotor(self, self.drives[drive]).speed
+
+    def rotor_speeds(self, state: Array) -> Array:
+        """Speeds of the rotors [rad/s], shape (..., n_rotors), at simulation states, shape (..., size)."""
+        speeds = np.array([rotor.speed for rotor in self.rotors])
+        return speeds + self._turned(state, SPEED, [-self.drive_speed(i) for i in range(len(self.drives))])
+
+    def turned(self, azimuths: Array, state: Array) -> Array:
+        """Azimuths of the rotors [rad] with those of their drives; arguments of shape (..., n_rotors), (..., size)."""
+        if not self.drives:
+            return azimuths
+        return np.asarray((azimuths + self._turned(state, "azimuth", [0.0] * len(self.drives))) % (2.0 * np.pi))
+
+    def _turned(self, state: Array, name: str, offsets: list[float]) -> Array:
+        """State of the drives by its name, plus an offset of each, at the rotors; 0 for those without a drive."""
+        found = np.zeros((*np.shape(state)[:-1], len(self.rotors)))
+        for j, rotor in enumerate(self.rotors):
+            if (i := drive_of(self, rotor)) >= 0:
+                found[..., j] = gear(self, rotor) * (state[..., self.layout.drive(i)[name]] + offsets[i])
+        return found
+
     def model(self, lead_lag: bool = True, cyclic_inflow: bool = True) -> Model:
         """Records of the compiled model with the given fidelity (theory.md section 7), with a single lane everywhere.
 
@@ -481,6 +507,8 @@ def _with_changes(values: Mapping[str, Any], error: str) -> str:
 
 def _digest(digest: Any, name: str, value: Any) -> None:
     """Add a named number, text or array to a digest; integers count as floats."""
+    if isinstance(value, tuple) and value and isinstance(value[0], str):
+        value = "/".join(value)
     if isinstance(value, str):
         digest.update(f"{name}={value};".encode())
         return

@@ -74,6 +74,7 @@ def consistency_problems(aircraft: "Aircraft") -> list[str]:
     problems += [
         f"body.surfaces[{i}].name = {name!r}: used twice" for i, name in enumerate(surfaces) if name in surfaces[:i]
     ]
+    problems += _drive_problems(aircraft, names)
     if problems:
         return problems
     if aircraft.body.is_stand:  # in place of a body
@@ -98,6 +99,31 @@ def _stand_problems(aircraft: "Aircraft") -> list[str]:
             for key, values in (("spring", body.stand_spring), ("damping", body.stand_damping)):
                 if values[i]:
                     problems.append(f"body.stand.{key}[{i}] = {values[i]:g}: allowed is 0, since {axis} is locked")
+    return problems
+
+
+def _drive_problems(aircraft: "Aircraft", names: list[str]) -> list[str]:
+    problems, joined = [], list[str]()
+    if aircraft.drives and aircraft.options.coupling != "complete":
+        problems.append(f"options.coupling = {aircraft.options.coupling!r}: allowed with drives is complete")
+    for i, drive in enumerate(aircraft.drives):
+        for name in drive.rotors:
+            if name not in names:
+                problems.append(f"drives[{i}].rotors = {name!r}: allowed are {', '.join(names)}")
+            if name in joined:
+                problems.append(f"drives[{i}].rotors = {name!r}: driven twice")
+            joined.append(name)
+        if (length := float(np.linalg.norm(drive.inertia_axis))) > 1 + 1e-9:
+            problems.append(f"drives[{i}].inertia_axis has the length {length:g}: allowed is up to 1")
+        if drive.engine != "none" and drive.max_torque == 0:
+            problems.append(f"drives[{i}].engine.max_torque = 0: allowed with an engine is > 0")
+        if drive.empty_voltage > drive.full_voltage:
+            problems.append(
+                f"drives[{i}].battery.empty_voltage = {drive.empty_voltage:g}: allowed is up to"
+                f" {drive.full_voltage:g}, the full_voltage"
+            )
+        if drive.proportional_gain > 0 and drive.integral_gain == 0:
+            problems.append(f"drives[{i}].governor.integral_gain = 0: allowed with a proportional_gain is > 0")
     return problems
 
 

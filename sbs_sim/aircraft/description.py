@@ -34,7 +34,7 @@ from sbs_sim.aircraft.declaration import (
     string,
 )
 from sbs_sim.content import ByContent
-from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, SWASHPLATE_NAMES
+from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, ENGINE_TORQUE, GOVERNOR, SPEED, SWASHPLATE_NAMES
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
@@ -629,6 +629,136 @@ class Rotor(ByContent):
         return np.stack([span, chord, chord * width / 2, lift, self.twist_at(span / length)])
 
 
+ENGINES = ("none", "engine", "electric")
+
+
+@dataclass(frozen=True, eq=False)
+class Drive(ByContent):
+    """A drive: rotors that turn together, and what turns them. All torques are at the speed of its first rotor."""
+
+    rotors: tuple[str, ...] = declared(
+        "Names of the rotors that it joins, whose gear ratios are those of their speeds; torques and inertia of the"
+        " drive are at the speed of the first",
+        list_schema({"type": "string", "minLength": 1}, 1, MAX_ROTORS),
+        tuple,
+    )
+    inertia: float = number(
+        "Moment of inertia of engine and transmission, without the blades", 0, 1e6, "kg m^2", symbol="I_t", default=0
+    )
+    inertia_axis: Array = array(
+        "Axis about which that inertia turns, body axes, after the right hand; shorter than 1 where parts of it turn"
+        " against each other, 0 where they cancel out",
+        -1,
+        1,
+        "1",
+        shape=(3,),
+        symbol=r"\mathbf a_t",
+        default=[0, 0, 0],
+    )
+    free_wheel: bool = declared(
+        "A one-way clutch: the rotors may turn faster than the engine, which then gives no torque",
+        {"type": "boolean"},
+        bool,
+        default=True,
+    )
+    engine: str = choice(
+        "none: the rotors turn freely; engine: torque by throttle; electric: motor, battery and controller",
+        ENGINES,
+        key="engine.kind",
+        default="none",
+    )
+    max_torque: float = number(
+        "Largest torque of the engine", 0, 1e7, "N m", key="engine.max_torque", symbol=r"Q_{max}", default=0
+    )
+    max_power: float = number(
+        "Largest power of the engine", 0, 1e9, "W", key="engine.max_power", symbol=r"P_{max}", default=1e9
+    )
+    lag: float = number(
+        "Time constant with which the torque of the engine follows",
+        0.001,
+        100,
+        "s",
+        key="engine.lag",
+        symbol=r"\tau_e",
+        default=0.1,
+    )
+    drag: float = number(
+        "Torque that the engine takes at the speed of the file, in proportion to the speed",
+        0,
+        1e7,
+        "N m",
+        key="engine.drag",
+        symbol="Q_0",
+        default=0,
+    )
+    throttle: float = number(
+        "Throttle of an engine without governor, or where its governor begins",
+        0,
+        1,
+        key="engine.throttle",
+        symbol=r"\delta_0",
+        default=0,
+    )
+    torque_constant: float = number(
+        "Torque of the motor over its current",
+        1e-6,
+        1e6,
+        "N m/A",
+        key="engine.torque_constant",
+        symbol="k_t",
+        default=1,
+    )
+    resistance: float = number(
+        "Resistance of motor, controller and battery",
+        1e-6,
+        1e6,
+        "Ohm",
+        key="engine.resistance",
+        symbol=r"R_e",
+        default=0.1,
+    )
+    full_voltage: float = number(
+        "Voltage of the full battery without load", 0, 1e5, "V", key="battery.full_voltage", symbol="V_1", default=50
+    )
+    empty_voltage: float = number(
+        "Voltage of the empty battery without load", 0, 1e5, "V", key="battery.empty_voltage", symbol="V_0", default=50
+    )
+    capacity: float = number(
+        "Charge of the full battery", 1e-6, 1e6, "A h", key="battery.capacity", symbol="C_b", default=1e6
+    )
+    set_point: float = number(
+        "Speed that the governor holds, over that of the file", 0.1, 2, key="governor.set_point", default=1
+    )
+    proportional_gain: float = number(
+        "Throttle per share of the speed that is missing",
+        0,
+        1e4,
+        key="governor.proportional_gain",
+        symbol="k_P",
+        default=0,
+    )
+    integral_gain: float = number(
+        "Its integral over time: throttle per second and share of the speed that is missing; 0 is no governor",
+        0,
+        1e4,
+        "1/s",
+        key="governor.integral_gain",
+        symbol="k_I",
+        default=0,
+    )
+
+    @property
+    def has_governor(self) -> bool:
+        """An engine whose throttle a governor sets."""
+        return self.engine != "none" and self.integral_gain > 0
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of its states that linear models have, see `StateLayout`."""
+        engine = (ENGINE_TORQUE,) if self.engine != "none" else ()
+        return (SPEED, *engine, *((GOVERNOR,) if self.has_governor else ()))
+
+
 @dataclass(frozen=True)
 class Control:
     """A pilot control.
@@ -722,3 +852,10 @@ class Description(ByContent):
     options: Options = part("How the model reads the equations", Options)
     controls: tuple[Control, ...] = _controls()
     rotors: tuple[Rotor, ...] = parts(f"The rotors, 1 to {MAX_ROTORS} of them", Rotor, 1, MAX_ROTORS)
+    drives: tuple[Drive, ...] = parts(
+        "Drives, which make the speeds of their rotors states of the model; without one a rotor keeps its speed",
+        Drive,
+        0,
+        MAX_ROTORS,
+        default=[],
+    )

@@ -7,18 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft.declaration import model_values
-from sbs_sim.aircraft.description import Body, Rotor
+from sbs_sim.aircraft.description import ENGINES, Body, Drive, Rotor
 from sbs_sim.aircraft.surfaces import parts_of
 from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells
 from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import hub_axes
-from sbs_sim.model.state import harmonic_count
+from sbs_sim.model.state import ENGINE_TORQUE, GOVERNOR, SPEED, UNSEEN_NAMES, harmonic_count
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
 
 Array = NDArray[np.float64]
+SECONDS_PER_HOUR = 3600.0
 MIN_DENSITY = 1e-12  # kg/m^3, less than at 300 km: below it is vacuum
 
 
@@ -48,6 +49,7 @@ def model_of(aircraft: "Aircraft") -> R.Model:
         air=_air(aircraft),
         body=_body(aircraft),
         rotors=_rotors(aircraft, quads),
+        drives=_drives(aircraft),
         blades=blades,
         indices=_state_indices(aircraft, quads),
         elements=_elements(aircraft),
@@ -147,6 +149,8 @@ def _blade_values(
         **model_values(rotor, R.BLADE),
         "lag_damping": factor * rotor.lag_damping,
         "damper_damping": factor * rotor.damper_damping,
+        "rotor_speed": _kept_speed(aircraft, rotor),
+        "inflow_speed": rotor.speed,
         "axes": hub_axes(rotor.shaft_direction),
         "lag_hinge_offset": rotor.hinge_offset - rotor.flap_hinge_offset,
         "first_moment": rotor.first_moment,
@@ -180,6 +184,9 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
         pressure = density * math.pi * (rotor.radius * rotor.radius) * (tip_speed * tip_speed)
         values = {
             **model_values(rotor, R.ROTOR),
+            "rotor_speed": _kept_speed(aircraft, rotor),
+            "inflow_speed": rotor.speed,
+            "gear": gear(aircraft, rotor),
             "axes": hub_axes(rotor.shaft_direction),
             "inverse_tip_speed": 1.0 / tip_speed,
             "coefficient_scale": 1.0 / pressure if density > MIN_DENSITY else 0.0,
@@ -196,10 +203,63 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
             "lag": layout.lag(j).start,
             "lag_rate": layout.lag_rate(j).start,
             "inflow": layout.inflow(j).start,
+            "drive": drive_of(aircraft, rotor),
         }
         for name, value in integers.items():
             rotors[j][name] = value
     return rotors
+
+
+def drive_of(aircraft: "Aircraft", rotor: Rotor) -> int:
+    """Index of the drive of a rotor, -1 for one whose speed is constant."""
+    return next((i for i, drive in enumerate(aircraft.drives) if rotor.name in drive.rotors), -1)
+
+
+def first_rotor(aircraft: "Aircraft", drive: Drive) -> Rotor:
+    """Rotor at whose speed torques and inertia of a drive are."""
+    return next(rotor for rotor in aircraft.rotors if rotor.name == drive.rotors[0])
+
+
+def gear(aircraft: "Aircraft", rotor: Rotor) -> float:
+    """Speed of a rotor over that of its drive; 0 without one."""
+    number = drive_of(aircraft, rotor)
+    return 0.0 if number < 0 else rotor.speed / first_rotor(aircraft, aircraft.drives[number]).speed
+
+
+def _kept_speed(aircraft: "Aircraft", rotor: Rotor) -> float:
+    """Speed of a rotor that does not change; 0 for one whose speed is a state."""
+    return rotor.speed if drive_of(aircraft, rotor) < 0 else 0.0
+
+
+def _drives(aircraft: "Aircraft") -> NDArray[Any]:
+    drives = R.records(R.DRIVE, len(aircraft.drives), 1)
+    for i, drive in enumerate(aircraft.drives):
+        speed, places = first_rotor(aircraft, drive).speed, aircraft.layout.drive(i)
+        values = {
+            "speed": speed,
+            "inertia": drive.inertia,
+            "momentum": drive.inertia * drive.inertia_axis,
+            "drag": drive.drag / speed if drive.engine != "none" else 0.0,
+            "max_torque": drive.max_torque,
+            "max_power": drive.max_power,
+            "inverse_lag": 1.0 / drive.lag,
+            "throttle": drive.throttle,
+            "set_point": drive.set_point * speed,
+            "proportional_gain": drive.proportional_gain,
+            "integral_gain": drive.integral_gain,
+            "torque_constant": drive.torque_constant,
+            "inverse_torque_constant": 1.0 / drive.torque_constant,
+            "conductance": 1.0 / drive.resistance,
+            "full_voltage": drive.full_voltage,
+            "voltage_drop": drive.full_voltage - drive.empty_voltage,
+            "inverse_capacity": 1.0 / (SECONDS_PER_HOUR * drive.capacity),
+        }
+        _set(drives[i], values)
+        drives[i]["engine"], drives[i]["free_wheel"] = ENGINES.index(drive.engine), drive.free_wheel
+        for field, name in (("speed", SPEED), ("torque", ENGINE_TORQUE), ("governor", GOVERNOR)):
+            drives[i][f"{field}_index"] = places.get(name, -1)
+        drives[i]["unseen_index"] = places[UNSEEN_NAMES[0]]
+    return drives
 
 
 def _state_indices(aircraft: "Aircraft", quads: NDArray[np.int64]) -> R.StateIndices:

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 VELOCITY_STEP, RATE_STEP, ATTITUDE_STEP = 0.05, 0.01, 1e-3  # m/s, rad/s, rad
 BLADE_STEP, BLADE_RATE_STEP, INFLOW_STEP, CONTROL_STEP = 1e-4, 1e-2, 1e-4, 1e-4  # rad, rad/s, 1, rad
+DRIVE_STEP = 2e-4  # of speed, largest torque and throttle
 BODY_STEPS = {
     **dict.fromkeys(("u", "v", "w"), VELOCITY_STEP),
     **dict.fromkeys(("p", "q", "r"), RATE_STEP),
@@ -24,7 +25,9 @@ BODY_STEPS = {
 
 def difference_steps(aircraft: Aircraft, scale: float = 1.0) -> Array:
     """Steps of the central differences for all linear states and the controls, shape (linear_size + n_controls,)."""
-    steps = [_state_step(name) for name in aircraft.layout.linear_names]
+    drives = aircraft.layout.drives
+    steps = [_state_step(name) for name in aircraft.layout.linear_names if S.part_of(name).family != "drive"]
+    steps += [_drive_step(aircraft, i, name) for i, names in enumerate(drives) for name in names]
     return scale * np.array(steps + [CONTROL_STEP * _size(control) for control in aircraft.controls])
 
 
@@ -32,6 +35,11 @@ def _size(control: Control) -> float:
     """What a step of a control is measured by: 1 rad, or the range of a control that is no angle."""
     low, high = control.range
     return 1.0 if control.is_angle else (high - low) or 1.0
+
+
+def _drive_step(aircraft: Aircraft, drive: int, name: str) -> float:
+    sizes = {S.SPEED: aircraft.drive_speed(drive), S.ENGINE_TORQUE: aircraft.drives[drive].max_torque, S.GOVERNOR: 1.0}
+    return DRIVE_STEP * sizes[name]
 
 
 def _state_step(name: str) -> float:

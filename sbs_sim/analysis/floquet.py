@@ -81,6 +81,8 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
     least, most = AZIMUTH_COUNTS
     if not least <= azimuth_count <= most or azimuth_count % 2:
         raise LinearizationError(f"azimuth_count = {azimuth_count}: allowed are even numbers from {least} to {most}")
+    if aircraft.drives:
+        raise LinearizationError("drives: allowed are rotors of constant speed, of which the period is known")
     period, _ = common_period(aircraft)
     times = period * np.arange(azimuth_count) / azimuth_count
     psi = times[:, None] * np.array([rotor.speed for rotor in aircraft.rotors])

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.model_records import drive_of, gear
 from sbs_sim.analysis.differences import difference_steps, jacobians, used_states
 from sbs_sim.analysis.kinematics import kinematics
 from sbs_sim.analysis.linear_model import LinearModel
@@ -104,6 +105,8 @@ def linearize_trim(
     """Linearize an aircraft about a trim of it; see `linearize`."""
     step_scale = _check_options(aircraft, method, step_scale)
     checks.instance("point", point, TrimPoint, LinearizationError)
+    if method == "paper" and aircraft.drives:
+        raise LinearizationError("method = 'paper': allowed with drives is averaged")
     if point.parameter_hash != aircraft.parameter_hash:
         raise LinearizationError("point: allowed is a trim of this aircraft, it is one of another")
     model = _averaged(aircraft, point, step_scale)
@@ -168,11 +171,23 @@ def _outputs(aircraft: Aircraft, point: TrimPoint, mean: Array) -> tuple[Array, 
     names = [*S.LINEAR_BODY_NAMES, "climb_rate", *(f"specific_force_{axis}" for axis in "xyz")]
     units = [*S.LINEAR_BODY_UNITS, "m/s", *("m/s^2",) * SPECIFIC_FORCE_SIZE]
     loads = mean[size + SPECIFIC_FORCE_SIZE :].reshape(len(aircraft.rotors), R.LOAD_SIZE, inputs)
-    for j, rotor in enumerate(aircraft.rotors):
-        rows += [*loads[j], rotor.speed * loads[j, R.TORQUE]]
+    speeds = aircraft.rotor_speeds(aircraft.layout.from_linear(point.state)).tolist()
+    for j in range(len(aircraft.rotors)):
+        rows += [*loads[j], _power_row(aircraft, point, j, speeds[j] * loads[j, R.TORQUE])]
         names += [f"{LOADS[i][0]}({j + 1})" for i in range(R.LOAD_SIZE)] + [f"power({j + 1})"]
         units += [LOADS[i][1] for i in range(R.LOAD_SIZE)] + ["W"]
     return np.stack(rows), tuple(names), tuple(units)
+
+
+def _power_row(aircraft: Aircraft, point: TrimPoint, rotor: int, at_speed: Array) -> Array:
+    """Derivative of the power of a rotor from that at its speed."""
+    if (drive := drive_of(aircraft, aircraft.rotors[rotor])) < 0:
+        return at_speed
+    row = at_speed.copy()
+    row[point.state_names.index(f"{S.SPEED}({drive + 1})")] += (
+        gear(aircraft, aircraft.rotors[rotor]) * point.torque[rotor]
+    )
+    return row
 
 
 def _climb_row(point: TrimPoint, inputs: int) -> Array:

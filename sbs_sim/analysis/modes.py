@@ -24,6 +24,7 @@ ComplexArray = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
 LONGITUDINAL, LATERAL = ("u", "w", "q", "theta"), ("v", "p", "phi", "r")
+DRIVE_MODES = {"Omega": "rotor speed", "engine_torque": "engine", "governor": "governor"}
 ALIKE = 1e-9  # poles that differ by less of the largest one are one multiple pole
 OWNED = 0.7  # share of one rotor in a mode of several beyond which it is that rotor's
 LEVEL = 0.9  # of the largest share: a family or rotor that comes as near to it has the mode as well
@@ -266,6 +267,12 @@ class _States:
         return [_Group("body", bool(i), (), half, {}, {}, {}) for i, half in enumerate(halves) if len(half)]
 
     @cached_property
+    def drives(self) -> list["_Group"]:
+        """The group of the drives, if there are any."""
+        found = self.where(family="drive")
+        return [_Group("drive", False, (), found, {}, {}, {})] if len(found) else []
+
+    @cached_property
     def places(self) -> dict[str, int]:
         """Of the states by name."""
         return {name: i for i, name in enumerate(self.names)}
@@ -415,7 +422,7 @@ def _own_choices(
 
 def _named(found: _Found, speeds: Mapping[int, float], states: _States) -> list[Mode]:
     """Every mode with the name that its group gives; of two with one name one takes its next choice if that is free."""
-    groups = [*states.halves]
+    groups = [*states.halves, *states.drives]
     for rotors in _alike_rotors(speeds, states):
         groups += _rotor_groups(states, rotors)
     choices = _choices(found, groups, states)
@@ -445,6 +452,9 @@ def _labels(found: _Found, chosen: Sequence[_Group], speeds: Mapping[int, float]
     labels: dict[int, _Label] = {}
     for group in {id(group): group for group in chosen}.values():
         inside = [i for i, own in enumerate(chosen) if own is group]
+        if group.family == "drive":
+            labels |= {i: _Label(_drive_name(found.rows[i], states), "drive") for i in inside}
+            continue
         if group.family != "body":
             labels |= zip(inside, _rotor_labels(found, inside, group, speeds, states), strict=True)
             continue
@@ -452,6 +462,14 @@ def _labels(found: _Found, chosen: Sequence[_Group], speeds: Mapping[int, float]
         for i, name in zip(inside, names, strict=True):
             labels[i] = _Label("heave-yaw" if _is_heave_yaw(found, i, states) else name, "body")
     return labels
+
+
+def _drive_name(row: Sequence[float], states: _States) -> str:
+    """Name of a mode after the state of a drive that has the largest share."""
+    places = states.where(family="drive").tolist()
+    name, _, number = states.names[max(places, key=lambda i: row[i])].partition("(")
+    several = len({states.names[i].partition("(")[2] for i in places}) > 1
+    return f"{DRIVE_MODES[name]}{', drive ' + number.rstrip(')') if several else ''}"
 
 
 # --- names of the body's modes ----------------------------------------------------------------------------------

@@ -133,6 +133,8 @@ class Sweep:
         if name not in self.names:
             return unit_of(name)
         part = S.part_of(name)
+        if part.family == "drive":
+            return S.DRIVE_UNITS[name.partition("(")[0]]
         return "1" if part.family == "inflow" else "rad/s" if part.is_rate else "rad"
 
     def __getitem__(self, name: str) -> Array:

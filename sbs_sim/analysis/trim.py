@@ -90,6 +90,8 @@ def solve_trim(
     """Trim an aircraft in a flight condition; see `trim`."""
     checks.instance("aircraft", aircraft, Aircraft, TrimError)
     checks.choice("method", method, METHODS, TrimError)
+    if method == "two_loop" and aircraft.drives:
+        raise TrimError("method = 'two_loop': allowed with drives is newton")
     problem = TrimProblem(aircraft, fidelity)
     start = None if guess is None else _start(problem, condition, checked_guess(aircraft, guess))
     if method == "two_loop":
@@ -137,7 +139,8 @@ def _controls(what: str, values: ArrayLike, aircraft: Aircraft) -> Array:
 def _guessed(layout: StateLayout) -> tuple[str, ...]:
     """Names of the linear state that a guess tells."""
     names = layout.linear_names
-    rotors = [name for name in names[S.LINEAR_BODY_SIZE :] if not S.part_of(name).is_rate]
+    parts = {name: S.part_of(name) for name in names[S.LINEAR_BODY_SIZE :]}
+    rotors = [name for name, part in parts.items() if not part.is_rate and part.family != "drive"]
     return (names[S.LINEAR_THETA], names[S.LINEAR_PHI], *rotors)
 
 

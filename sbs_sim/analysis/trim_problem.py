@@ -6,12 +6,13 @@ the averages of the six body accelerations, of the flap and lag accelerations an
 
 import copy
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.description import Drive
 from sbs_sim.flight.engine import Engine, points_engine
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.flight.validity import warnings
@@ -19,7 +20,6 @@ from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
 from sbs_sim.model.balance import trim_residuals, trim_sides
-from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
 
@@ -39,15 +39,19 @@ BODY_BALANCES = (
     "pitching moment",
     "yawing moment",
 )
+DRIVE_BALANCES = {S.SPEED: "torque of a drive", S.ENGINE_TORQUE: "throttle", S.GOVERNOR: "speed of a governor"}
+DROOP = 1e-6  # share of the speed that a governor may lack
+HALF = 0.5  # of torque and throttle: where trims begin
 
 
 class TrimProblem:
     """The equations of trim for one aircraft and fidelity.
 
     Unknowns, shape (n,): pitch, roll, the four controls that are not held [rad, or over `Aircraft.trim_scales`]; then
-    rotor by rotor flap, lag [rad] and inflow.
+    rotor by rotor flap, lag [rad] and inflow; then drive by drive the share by which its speed is off that of the file,
+    its torque over the largest one, and what its governor has integrated.
     Equations, shape (n,): the rates of u, v, w, p, q, r; then those of the rotor states in the unknowns' order, flap
-    and lag by their accelerations.
+    and lag by their accelerations; then those of the drives.
 
     Attributes
     ----------
@@ -68,11 +72,14 @@ class TrimProblem:
         self.engine = points_engine(aircraft.arranged(fidelity.lead_lag, fidelity.cyclic_inflow, "points"))
         self._psi = azimuths(self.aircraft.passages, fidelity.azimuth_count)
         self._places, equations, owners = self._rotor_unknowns()
+        driven = np.arange(self.layout.drives_start, self.layout.linear_size - S.LINEAR_BODY_SIZE + S.BODY_SIZE)
+        self._places, equations = np.append(self._places, driven), np.append(equations, driven)
+        owners = np.append(owners, np.full(len(driven), len(aircraft.rotors)))
         self._owners = np.concatenate([np.full(BODY_UNKNOWNS, len(aircraft.rotors)), owners])
         self.equations = np.concatenate([np.arange(S.VELOCITY, S.BODY_SIZE), equations])
         self.scales = self._equation_scales()
-        is_inflow = self._places >= self.layout.inflow(0).start
-        self.coordinates = BODY_UNKNOWNS + np.flatnonzero(~is_inflow)
+        is_inflow = (self._places >= self.layout.inflow(0).start) & (self._places < self.layout.drives_start)
+        self.coordinates = BODY_UNKNOWNS + np.flatnonzero(self._places < self.layout.inflow(0).start)
         self.inflow = BODY_UNKNOWNS + np.flatnonzero(is_inflow)
         self.loads = np.zeros((len(aircraft.rotors), R.LOAD_SIZE))
 
@@ -100,6 +107,11 @@ class TrimProblem:
         for j, rotor in enumerate(self.aircraft.rotors):
             scales[self.layout.flap_rate(j)] = scales[self.layout.lag_rate(j)] = rotor.speed * rotor.speed
             scales[self.layout.inflow(j)] = rotor.speed
+        for i, drive in enumerate(self.aircraft.drives):
+            own = {S.SPEED: self.aircraft.drive_speed(i) ** 2, S.ENGINE_TORQUE: drive.max_torque / drive.lag}
+            own[S.GOVERNOR] = drive.integral_gain
+            for name in drive.state_names:
+                scales[self.layout.drive(i)[name]] = own[name]
         return scales[self.equations]
 
     def lighter(self, share: float) -> "TrimProblem":
@@ -113,7 +125,17 @@ class TrimProblem:
 
     def unknowns(self, pitch: float, roll: float, controls: Array, x: Array) -> Array:
         """Vector of unknowns of attitude and controls [rad] and of the rotors' part of a simulation state."""
-        return np.concatenate([[pitch, roll], controls, x[self._places]])
+        return np.concatenate([[pitch, roll], controls, self._with_drives(x, _drive_unknowns)[self._places]])
+
+    def _with_drives(self, x: Array, change: Callable[[Drive, float, dict[str, float]], dict[str, float]]) -> Array:
+        """Copy of a state with changed states of the drives."""
+        changed = x.copy()
+        for i, drive in enumerate(self.aircraft.drives):
+            places = self.layout.drive(i)
+            own = change(drive, self.aircraft.drive_speed(i), {name: x[places[name]] for name in drive.state_names})
+            for name, value in own.items():
+                changed[places[name]] = value
+        return changed
 
     def state(self, condition: TrimCondition, unknowns: Array) -> tuple[Array, Array]:
         """Simulation state at the origin, heading north, and swashplate angles of a vector of unknowns."""
@@ -122,6 +144,7 @@ class TrimProblem:
         x[S.ATTITUDE : S.ATTITUDE + 4] = euler_to_quaternion(0.0, pitch, roll)
         x[S.VELOCITY : S.RATES], x[S.RATES : S.BODY_SIZE] = condition.motion(pitch, roll)
         x[self._places] = unknowns[BODY_UNKNOWNS:]
+        x = self._with_drives(x, _drive_states)
         return x, self.aircraft.mix(self.controls(unknowns))
 
     def controls(self, unknowns: Array) -> Array:
@@ -172,6 +195,8 @@ class TrimProblem:
         if place < S.BODY_SIZE:
             return BODY_BALANCES[place - S.VELOCITY]
         part = S.part_of(self.layout.names[place])
+        if part.family == "drive":
+            return DRIVE_BALANCES[self.layout.names[place].partition("(")[0]]
         return f"{part.family} of {self.aircraft.rotors[part.rotor].name}"
 
     def beyond_limits(self, unknowns: Array) -> tuple[str, ...]:
@@ -185,7 +210,7 @@ class TrimProblem:
         """Result of a solution."""
         residual = self.residual(condition, unknowns)
         x, swash = self.state(condition, unknowns)
-        speeds = np.array([rotor.speed for rotor in self.aircraft.rotors])
+        speeds = self.aircraft.rotor_speeds(x)
         torque = self.loads[:, R.TORQUE].copy()
         return TrimPoint(
             condition=condition,
@@ -216,7 +241,8 @@ class TrimProblem:
         """Linear state of a simulation state whose attitude is known."""
         u, v, w, p, q, r = x[S.VELOCITY : S.BODY_SIZE]
         pitch, roll = unknowns[:ATTITUDE_UNKNOWNS]
-        return np.concatenate(([u, w, q, pitch, v, p, roll, r], x[S.BODY_SIZE :]))
+        end = self.layout.linear_size - S.LINEAR_BODY_SIZE + S.BODY_SIZE
+        return np.concatenate(([u, w, q, pitch, v, p, roll, r], x[S.BODY_SIZE : end]))
 
     def _warnings(self, x: Array, swash: Array) -> tuple[str, ...]:
         """Where the model does not hold, by the mean of the working states over a few azimuths."""
@@ -224,11 +250,49 @@ class TrimProblem:
         psi = azimuths(self.aircraft.passages, count)
         states, angles = engine.lanes([x]), engine.lanes([swash.ravel()])
         places, still_air = engine.lanes(list(psi)), engine.memory(3)
-        derivative(engine.model, states, angles, places, still_air, engine.work, engine.tick.slopes[0], False)
+        engine.derivative(engine.model, states, angles, places, still_air, engine.work, engine.tick.slopes[0], False)
         rows = engine.memory(engine.rotors, WORKING_SIZE)
         working_state(engine.model, engine.work, rows)
         unequal = (f"{rotor.name}: {UNEQUAL_BLADES}" for rotor in self.aircraft.rotors if not rotor.has_equal_blades)
-        return (*warnings(self.aircraft, rows[..., :count].mean(axis=-1)), *unequal)
+        return (*warnings(self.aircraft, rows[..., :count].mean(axis=-1)), *unequal, *self._droops(x))
+
+    def _droops(self, x: Array) -> list[str]:
+        """Governors that cannot hold their speed, a line each."""
+        found = []
+        for i, drive in enumerate(self.aircraft.drives):
+            places, speed = self.layout.drive(i), self.aircraft.drive_speed(i)
+            if drive.has_governor:
+                missing = drive.set_point - x[places[S.SPEED]] / speed
+                wanted = drive.throttle + x[places[S.GOVERNOR]] + drive.proportional_gain * missing
+                if abs(missing) > DROOP and not 0.0 <= wanted <= 1.0:
+                    found.append(f"drive {i + 1}: throttle at its end, speed {missing:.1%} below its set point")
+        return found
+
+
+def _drive_unknowns(drive: Drive, speed: float, own: dict[str, float]) -> dict[str, float]:
+    """Unknowns of the states of a drive; of one that stands still those with which a trim begins."""
+    if own[S.SPEED] == 0.0:
+        begin = {S.SPEED: drive.set_point - 1.0 if drive.has_governor else 0.0, S.ENGINE_TORQUE: HALF}
+        begin[S.GOVERNOR] = _throttle(drive, speed) - drive.throttle
+        return {name: begin[name] for name in own}
+    scaled = {S.SPEED: own[S.SPEED] / speed - 1.0, S.ENGINE_TORQUE: own.get(S.ENGINE_TORQUE, 0.0)}
+    scaled[S.ENGINE_TORQUE] /= drive.max_torque or 1.0
+    return {name: scaled.get(name, value) for name, value in own.items()}
+
+
+def _throttle(drive: Drive, speed: float) -> float:
+    """Throttle that gives about half the largest torque at a speed [rad/s]: there no limit is in the way of a trim."""
+    if drive.engine != "electric":
+        return HALF
+    current = HALF * drive.max_torque / drive.torque_constant
+    voltage = drive.torque_constant * speed + drive.resistance * current
+    return min(voltage / drive.full_voltage, 1.0) if drive.full_voltage > 0.0 else HALF
+
+
+def _drive_states(drive: Drive, speed: float, own: dict[str, float]) -> dict[str, float]:
+    """States of a drive of its unknowns, as `sbs_sim.model.balance.set_drives` has them."""
+    scaled = {S.SPEED: speed * (1.0 + own[S.SPEED]), S.ENGINE_TORQUE: drive.max_torque * own.get(S.ENGINE_TORQUE, 0.0)}
+    return {name: scaled.get(name, value) for name, value in own.items()}
 
 
 def _beyond_limits(aircraft: Aircraft, controls: Array, swash: Array) -> tuple[str, ...]:

@@ -105,7 +105,8 @@ def rotor_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
         return [factor * float(snapshot.loads[j, R.THRUST]) for j in rotors]
 
     def power(snapshot: Snapshot) -> list[float]:
-        return [factor * float(snapshot.loads[j, R.TORQUE]) * aircraft.rotors[j].speed for j in rotors]
+        speeds = aircraft.rotor_speeds(snapshot.state).tolist()
+        return [factor * float(snapshot.loads[j, R.TORQUE]) * speeds[j] for j in rotors]
 
     return (
         Chart("Flap", "deg", names("a0", "a1", "b1"), coordinates(layout.flap, DEGREES), 2, 0.1),

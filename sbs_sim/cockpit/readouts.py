@@ -77,9 +77,8 @@ def readout(aircraft: Aircraft, snapshot: Snapshot, status: Status, source: str)
     to_earth = rotation_matrix(state[S.ATTITUDE : S.VELOCITY])
     ground = to_earth @ state[S.VELOCITY : S.RATES]
     yaw, pitch, roll = quaternion_to_euler(state[S.ATTITUDE : S.VELOCITY])
-    power = sum(
-        float(load[R.TORQUE]) * rotor.speed for load, rotor in zip(snapshot.loads, aircraft.rotors, strict=True)
-    )
+    speeds = aircraft.rotor_speeds(state).tolist()
+    power = sum(float(load[R.TORQUE]) * speed for load, speed in zip(snapshot.loads, speeds, strict=True))
     rows = (
         ("time", f"{snapshot.time:.2f}", "s"),
         ("airspeed", f"{np.linalg.norm(ground - snapshot.wind):.2f}", "m/s"),

@@ -163,8 +163,9 @@ class Scene:
         state, layout = snapshot.state, self.aircraft.layout
         self._body.wxyz = state[S.ATTITUDE : S.VELOCITY]
         self._earth.position = -state[S.POSITION : S.ATTITUDE]
-        for j, (nodes, rotor) in enumerate(zip(self._rotors, self.aircraft.rotors, strict=True)):
-            azimuth = float(snapshot.azimuth[j]) + rotor.speed * lead
+        speeds = self.aircraft.rotor_speeds(state).tolist()
+        for j, nodes in enumerate(self._rotors):
+            azimuth = float(snapshot.azimuth[j]) + speeds[j] * lead
             nodes.draw_blades(azimuth, state[layout.flap(j)], state[layout.lag(j)], self._shown)
             nodes.draw_loads(snapshot.loads[j], self._shown)
             nodes.draw_inflow(state[layout.inflow(j)], self.inflow_range, self._shown)

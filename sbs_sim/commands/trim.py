@@ -1,6 +1,7 @@
 """`trim`: attitude, controls and loads of a steady flight."""
 
 import argparse
+import math
 from typing import TYPE_CHECKING
 
 from sbs_sim.commands.common import (
@@ -94,6 +95,9 @@ def _rotor_rows(craft: "Aircraft", point: "TrimPoint") -> list[list[str]]:
         ["torque [N m]", *(fixed(value, 4) for value in point.torque)],
         ["power [W]", *(fixed(value, 2) for value in point.power)],
     ]
+    if craft.drives:
+        speeds = craft.rotor_speeds(craft.layout.from_linear(point.state))
+        rows.append(["speed [rpm]", *(fixed(speed * 30.0 / math.pi, 2) for speed in speeds)])
     for name, angles in zip(SWASHPLATE_NAMES, point.swashplate.T, strict=True):
         rows.append([f"{name} [deg]", *(fixed(angle * DEGREES, 4) for angle in angles)])
     families: dict[str, dict[str, list[str]]] = {"flap": {}, "lag": {}, "inflow": {}}

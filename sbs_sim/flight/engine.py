@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.model import records as R
 from sbs_sim.model.average import averaged_derivative
+from sbs_sim.model.drive import driven_derivative
 from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.integrate import RK4, STAGES, advance
 from sbs_sim.model.kernel import address
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Code:
-    """Machine code of the entries that other entries call, for one arrangement of lanes; whatever the aircraft.
+    """Machine code of the entries that other entries call, for one arrangement of lanes, with drives or without.
 
     Each is compiled, or taken from its cache, when it is first asked for: a trim makes no steps in time.
 
@@ -38,10 +39,10 @@ class Code:
 
     @cached_property
     def derivative(self) -> Any:
-        """`sbs_sim.model.dynamics.derivative`."""
+        """`Engine.derivative`."""
         engine, tick = self._pattern, self._pattern.tick
         return address(
-            derivative,
+            engine.derivative,
             *(engine.model, tick.stage, engine.memory(3 * engine.rotors), tick.psi, tick.wind, engine.work),
             *(tick.slopes[0], True),
         )
@@ -98,9 +99,15 @@ class Engine:
     @property
     def code(self) -> Code:
         """Machine code of this arrangement."""
-        if self._arrangement not in _codes:
-            _codes[self._arrangement] = Code(self)
-        return _codes[self._arrangement]
+        key = (*self._arrangement, len(self.model.drives) > 0)
+        if key not in _codes:
+            _codes[key] = Code(self)
+        return _codes[key]
+
+    @property
+    def derivative(self) -> Any:
+        """Entry with the equations: `sbs_sim.model.dynamics.derivative`, or `sbs_sim.model.drive.driven_derivative`."""
+        return driven_derivative if len(self.model.drives) else derivative
 
     @property
     def _arrangement(self) -> tuple[int, int]:
@@ -172,4 +179,4 @@ def points_engine(model: R.Model) -> Engine:
 
 
 _own = threading.local()
-_codes: dict[tuple[int, int], Code] = {}
+_codes: dict[tuple[int, int, bool], Code] = {}

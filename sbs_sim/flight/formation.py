@@ -205,7 +205,7 @@ def _rows(one: Simulation, plan: _Plan, angles: Array, states: Array, forces: Ar
         state=np.ascontiguousarray(states),
         acceleration=np.ascontiguousarray(forces),
         swashplate=angles[plan.recorded],
-        azimuth=plan.azimuth,
+        azimuth=one.aircraft.turned(plan.azimuth, states),
         loads=np.ascontiguousarray(loads).reshape(len(plan.steps), -1, LOAD_SIZE),
         wind=plan.wind,
     )

@@ -67,7 +67,7 @@ def named_histories(aircraft: Aircraft, blocks: Sequence[tuple[Rows, Array]], lo
     loads = np.concatenate([rows.loads for rows, _ in blocks])
     wind = np.concatenate([rows.wind for rows, _ in blocks])
     attitude, velocity = states[:, S.ATTITUDE : S.VELOCITY], states[:, S.VELOCITY : S.RATES]
-    speeds = np.array([rotor.speed for rotor in aircraft.rotors])
+    speeds = aircraft.rotor_speeds(states)
     return flown | {
         "acceleration": np.concatenate([rows.acceleration for rows, _ in blocks]),
         "thrust": loads[:, :, R.THRUST],

@@ -83,7 +83,8 @@ class Event(ByContent):
     step : int
         Integration steps before it.
     kind : str
-        "start" (state, swashplate, wind), "swashplate", "reset" (state, swashplate) or "wind".
+        "start" (state, swashplate, wind), "swashplate", "reset" (state, swashplate), "wind" or "engine_failure" (drive,
+        failure).
     swashplate : ndarray, shape (n_rotors, 3), or None
         [rad]
     state : ndarray, shape (size,), or None
@@ -93,6 +94,10 @@ class Event(ByContent):
         mid-flight.
     wind_ticks : int
         Of a start: ticks of its wind that have started; 0 for one that is new.
+    drive : int
+        Of the failure of an engine: the number of its drive, of which the first is 1; else 0.
+    failure : float
+        There the share of its torque that it has lost.
     """
 
     step: int
@@ -102,3 +107,5 @@ class Event(ByContent):
     wind: Wind | None = None
     wind_step: int = 0
     wind_ticks: int = 0
+    drive: int = 0
+    failure: float = 0.0

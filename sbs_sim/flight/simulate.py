@@ -3,11 +3,13 @@
 from __future__ import annotations  # `help` then shows types by their names
 
 import math
+from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.flight.controls import Commands
+from sbs_sim.flight.engine_failure import EngineFailure
 from sbs_sim.flight.history import History
 from sbs_sim.flight.simulation import AZIMUTH_STEP, METHOD
 from sbs_sim.flight.sortie import Sortie, fly_together
@@ -29,6 +31,7 @@ def simulate(
     wind: Wind | None = None,
     ground_altitude: float = -math.inf,
     actuators: bool = False,
+    events: Sequence[EngineFailure] = (),
 ) -> History:
     """Fly for a while and return what happened.
 
@@ -50,6 +53,8 @@ def simulate(
         steps that their actuators would not follow are in `warnings`. True: the mixer of the live flight is
         between them. It clips controls and angles to their ranges, with a warning, and moves the swashplates at the
         rates of their actuators.
+    events : sequence of EngineFailure
+        Of aircraft with drives: engines that fail, or run again, on the way.
 
     Returns
     -------
@@ -73,6 +78,7 @@ def simulate(
         duration,
         wind=wind,
         actuators=actuators,
+        events=events,
         tick=tick,
         azimuth_step=azimuth_step,
         lead_lag=lead_lag,

@@ -22,7 +22,6 @@ from sbs_sim.flight.formation import Flown, Formation
 from sbs_sim.flight.records import Event, Snapshot
 from sbs_sim.flight.rotor_matrices import RotorMatrices, arranged, rotor_matrices
 from sbs_sim.model import state as S
-from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.frames import down_of
 from sbs_sim.model.ground import lowest_point
 from sbs_sim.model.integrate import ETD, FLYING, PARTITIONED, RK4, TSIT5, advance, azimuths_at
@@ -33,6 +32,7 @@ from sbs_sim.model.working_state import WORKING_SIZE, working_state
 Array = NDArray[np.float64]
 
 UNIT = 1e-9  # a quaternion whose norm is this near to one is a unit quaternion
+FREE_METHODS = ("rk4", "tsit5")  # for rotors whose speed is a state
 METHODS = {"etd": ETD, "rk4": RK4, "tsit5": TSIT5, "partitioned": PARTITIONED}
 METHOD = "etd"  # by default
 TICKS = (1e-4, 1.0)  # s, shortest and longest
@@ -52,6 +52,8 @@ PLAUSIBLE_VELOCITY = 350.0  # m/s
 PLAUSIBLE_RATE = 100.0  # rad/s
 PLAUSIBLE_ANGLE = 1.5  # rad, multiblade coordinates of flap and lag
 PLAUSIBLE_INFLOW = 1.0
+PLAUSIBLE_SPEED = 3.0  # of rotors, over that of the file
+PLAUSIBLE_TURNS = 1e9  # rad
 
 
 class Simulation:
@@ -74,7 +76,7 @@ class Simulation:
     method : str
         "etd", of fourth order, which solves what is stiff in the rotors exactly; "rk4", the classical one; "tsit5", of
         fifth order; or "partitioned": the paper's scheme,
-        whose error is of first order in the step.
+        whose error is of first order in the step. Aircraft with drives fly by "rk4" or "tsit5".
     wind : Wind
     ground_altitude : float
         Height of level ground above the origin [m]; touching it ends the flight. -inf is no ground.
@@ -105,6 +107,8 @@ class Simulation:
         lead_lag = checks.flag("lead_lag", lead_lag, SimulationError)
         cyclic_inflow = checks.flag("cyclic_inflow", cyclic_inflow, SimulationError)
         checks.choice("method", method, tuple(METHODS), SimulationError)
+        if aircraft.drives:
+            checks.choice("method of an aircraft with drives", method, FREE_METHODS, SimulationError)
         ground = checks.number("ground_altitude", ground_altitude, -math.inf, PLAUSIBLE_POSITION, "m", SimulationError)
         self.options: dict[str, Any] = {
             "tick": tick,
@@ -185,7 +189,7 @@ class Simulation:
         Raises
         ------
         SimulationError
-            See `reset`, `set_swashplate`.
+            See `reset`, `set_swashplate`, `fail_engine`.
         """
         if event.state is not None and event.swashplate is not None:
             self.reset(event.state, event.swashplate)
@@ -193,6 +197,8 @@ class Simulation:
             self.set_swashplate(event.swashplate)
         if event.wind is not None:
             self.set_wind(event.wind)
+        if event.drive:
+            self.fail_engine(event.drive, event.failure)
 
     def checked_state(self, state: ArrayLike) -> Array:
         """Copy of a simulation state that is complete, finite and plausible.
@@ -263,6 +269,33 @@ class Simulation:
         """Put the aircraft elsewhere; time, azimuths and wind go on."""
         new_state, new_angles = self.checked_state(state), self.checked_swashplate(swashplate)
         self.state, self.swashplate = new_state, new_angles
+
+    def checked_engine(self, drive: int) -> int:
+        """Place in the state of what has failed of the engine of a drive, of which the first is 1.
+
+        Raises
+        ------
+        SimulationError
+            There is no such drive, or it has no engine.
+        """
+        engines = [i + 1 for i, own in enumerate(self.aircraft.drives) if own.engine != "none"]
+        if drive not in engines:
+            allowed = f"allowed are {', '.join(map(str, engines))}" if engines else "the aircraft has none"
+            raise SimulationError(f"engine of drive {checks.shown(drive)}: {allowed}")
+        return self.layout.drive(drive - 1)["engine_failure"]
+
+    def fail_engine(self, drive: int = 1, share: float = 1.0) -> None:
+        """Let the engine of a drive lose a share of its torque from now on; 0 lets it run again.
+
+        Raises
+        ------
+        SimulationError
+            See `checked_engine`; a share out of range.
+        """
+        place, share = self.checked_engine(drive), checks.number("share", share, 0.0, 1.0, "", SimulationError)
+        state = self.state.copy()
+        state[place] = share
+        self.state = state
 
     def advance(self) -> None:
         """Fly one tick.
@@ -338,7 +371,7 @@ class Simulation:
         engine, now = self.engine, np.array([self.step])
         azimuth, air = self.azimuths(now)[0], self.air_at(now, self._air[np.newaxis])[0]
         working = engine.memory(engine.rotors, WORKING_SIZE)
-        derivative(
+        engine.derivative(
             *(engine.model, _single(self.state), _single(self.swashplate), _single(azimuth), _single(air)),
             *(engine.work, engine.tick.slopes[0], True),
         )
@@ -350,7 +383,7 @@ class Simulation:
             state=self.state.copy(),
             acceleration=engine.work.acceleration_rows[:3, 0] + down * self.aircraft.environment.gravity,
             swashplate=self.swashplate.copy(),
-            azimuth=azimuth,
+            azimuth=self.aircraft.turned(azimuth, self.state),
             loads=engine.work.load_rows.reshape(engine.rotors, -1).copy(),
             wind=air,
             working=working[..., 0],
@@ -373,6 +406,12 @@ def plausible_bounds(aircraft: Aircraft) -> Array:
     for j, rotor in enumerate(aircraft.rotors):
         bounds[layout.flap(j)] = bounds[layout.lag(j)] = PLAUSIBLE_ANGLE
         bounds[layout.flap_rate(j)] = bounds[layout.lag_rate(j)] = PLAUSIBLE_ANGLE * 10 * rotor.speed
+    for i in range(len(layout.drives)):
+        speed, places = aircraft.drive_speed(i), layout.drive(i)
+        bounds[list(places.values())] = 1e9
+        bounds[places[S.SPEED]] = PLAUSIBLE_SPEED * speed
+        bounds[places["azimuth"]] = PLAUSIBLE_TURNS
+        bounds[places["discharge"]], bounds[places["engine_failure"]] = 2.0, 1.0
     return bounds
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations  # `help` then shows types by their names
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ from sbs_sim.concurrency import interruption
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.actuation import Direct, Mixed, commanded_angles
 from sbs_sim.flight.controls import Commands, check_rows, command
+from sbs_sim.flight.engine_failure import EngineFailure, failures_by_tick
 from sbs_sim.flight.formation import Flown, Formation
 from sbs_sim.flight.history import History, named_histories
 from sbs_sim.flight.records import Rows
@@ -35,7 +37,7 @@ class Sortie:
 
     Parameters
     ----------
-    aircraft, start, controls, duration, wind, actuators
+    aircraft, start, controls, duration, wind, actuators, events
         See `simulate`.
     every : int
         Ticks from one row of the histories to the next.
@@ -69,6 +71,7 @@ class Sortie:
         loaded: bool = True,
         wind: Wind | None = None,
         actuators: bool = False,
+        events: Sequence[EngineFailure] = (),
         **options: Any,
     ) -> None:
         checks.instance("aircraft", aircraft, Aircraft, SimulationError)
@@ -84,6 +87,7 @@ class Sortie:
         self.simulation = Simulation(aircraft, state, angles, wind=air, **options)
         self.ticks = round(duration / self.simulation.tick)
         check_rows(controls, self.ticks, self.simulation.tick)
+        self.failures = failures_by_tick(self.simulation, events)
         self.every, self.loaded = every, loaded
         self.fault: SimulationError | None = None
         self._blocks: list[tuple[Rows, Array]] = []
@@ -135,10 +139,13 @@ def fly_together(sorties: Sequence[Sortie]) -> None:
         One, or up to `sbs_sim.model.packing.lane_count()` with `structure` and ticks in common.
     """
     formation, first = Formation([sortie.simulation for sortie in sorties]), sorties[0]
-    size = _block(first.simulation, len(sorties))
-    for begin in range(0, first.ticks + 1, size):
+    size, last = _block(first.simulation, len(sorties)), first.ticks + 1
+    cuts = {*range(0, last, size), *(tick for sortie in sorties for tick in sortie.failures if tick < last)}
+    for begin, end in itertools.pairwise([*sorted(cuts), last]):
         interruption.look()
-        end = min(begin + size, first.ticks + 1)
+        for sortie in sorties:
+            for failure in sortie.failures.get(begin, ()):
+                sortie.simulation.fail_engine(failure.drive, failure.share)
         flying = [sortie.fault is None for sortie in sorties]
         angles = [
             sortie.commanded(begin, end) if one else np.empty(0) for sortie, one in zip(sorties, flying, strict=True)
@@ -168,9 +175,11 @@ def structure(simulation: Simulation) -> Any:
     """What flights that are flown side by side have in common."""
     aircraft, model = simulation.aircraft, simulation.model
     blades = tuple(rotor.blades for rotor in aircraft.rotors)
+    drives = model.rotors["drive"], model.drives["engine"], model.drives["free_wheel"]
     return (
         *(blades, aircraft.options, tuple(map(id, aircraft.tables)), simulation.steps_per_tick, simulation.method),
         *(simulation.tick, simulation.step, model.switches.tobytes()),
+        *(aircraft.layout.drives, *(part.tobytes() for part in drives)),
     )
 
 

@@ -103,6 +103,10 @@ class Record:
             self.data[name] = value
         elif kind == "lanes":
             self.data[name] = rounded(value).values
+        elif kind == "matrix":
+            for row, vector in zip(self.data[name], (value.x, value.y, value.z), strict=True):
+                for axis, part in enumerate(vector):
+                    row[axis] = rounded(part).values
         else:
             for axis, part in enumerate(value):
                 self.data[name][axis] = rounded(part).values

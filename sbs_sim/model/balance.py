@@ -127,9 +127,20 @@ def set_flight(model, inputs, motion, rotor_indices, rigging, tick):
     set_steady_flight(given[PITCH], given[ROLL], motion, x)
     for i in range(rotor_indices.size):
         x[rotor_indices[i]] = given[inputs.shape[0] - rotor_indices.size + i]
+    set_drives(as_records(model.drives), x)
     mix(rigging, given, CONTROLS, swash)
     for i in range(3):
         wind[i] = 0.0
+
+
+@kernel
+def set_drives(drives, x):
+    """Speeds and torques of drives from the unknowns of a trim: 1 + u times the speed, u times the largest torque."""
+    for i in range(drives.shape[0]):
+        drive = drives[i]
+        x[drive.speed_index] = rounded(drive.speed * (1.0 + x[drive.speed_index]))
+        if drive.torque_index >= 0:
+            x[drive.torque_index] = rounded(drive.max_torque * x[drive.torque_index])
 
 
 @kernel

@@ -145,12 +145,18 @@ def derivative(model, x, swash, psi, wind, work, dx, with_loads):
 @kernel
 def in_lanes(model):
     """A model as records of lanes."""
-    air, blades = as_records(model.air), as_records(model.blades)
+    return with_rotors(model, as_records(model.rotors), as_records(model.blades))
+
+
+@kernel
+def with_rotors(model, rotors, blades):
+    """A model as records of lanes, with its rotors and blades or others of the same kind."""
+    air = as_records(model.air)
     return Aircraft(
         switches=as_records(model.switches),
         air=air,
         body=as_records(model.body),
-        rotors=as_records(model.rotors),
+        rotors=rotors,
         blades=blades,
         indices=model.indices,
         elements=as_records(model.elements),
@@ -269,8 +275,8 @@ def induced_velocity(aircraft, x, blade, pose):
     inflow, quad = aircraft.indices.inflow, blade.quad
     lambda0, lambdas, lambdac = inflow[S.UNIFORM], inflow[S.SINE], inflow[S.COSINE]
     sine_part = spread(x, lambdas, quad, blade) * pose.sine
-    gradient = blade.rotor_speed * (spread(x, lambdac, quad, blade) * pose.cosine + sine_part)
-    return blade.rotor_speed * blade.radius * spread(x, lambda0, quad, blade), gradient
+    gradient = blade.inflow_speed * (spread(x, lambdac, quad, blade) * pose.cosine + sine_part)
+    return blade.inflow_speed * blade.radius * spread(x, lambda0, quad, blade), gradient
 
 
 @kernel

@@ -77,9 +77,9 @@ def inflow_rates(rotor, inflow, flow, loads, cyclic):
     driven = solve_gain(uniform_gain, flow.skew_cosine, flow.skew_sine, inflow)
     # without its cyclic parts the uniform inflow follows Glauert's single equation
     uniform = select(cyclic == 1, driven.uniform, inflow.uniform / uniform_gain)
-    inverse_inertia = rotor.rotor_speed * INVERSE_INERTIA
+    inverse_inertia = rotor.inflow_speed * INVERSE_INERTIA
     return Inflow(
-        rotor.rotor_speed * INVERSE_MASS * (loads.uniform - flow.uniform * uniform),
+        rotor.inflow_speed * INVERSE_MASS * (loads.uniform - flow.uniform * uniform),
         select(cyclic == 1, inverse_inertia * (loads.cosine - flow.cyclic * driven.cosine), 0.0),
         select(cyclic == 1, inverse_inertia * (loads.sine - flow.cyclic * driven.sine), 0.0),
     )

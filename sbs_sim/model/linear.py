@@ -104,7 +104,8 @@ def evaluate_inputs(derivative, model, inputs, rigging, work, tick):
     rotors = as_records(model.rotors)
     point, x, dx = as_lanes(inputs, rotors), as_lanes(tick.stage, rotors), as_lanes(tick.slopes, rotors)
     wind, swash = as_lanes(tick.wind, rotors), dx[1]
-    set_state(point, x)
+    unseen = len(S.UNSEEN_NAMES) * model.drives.shape[0]
+    set_state(point, x, x.shape[0] - unseen)
     for i in range(3):
         wind[i] = 0.0
     mix(rigging, point, point.shape[0] - (rigging.shape[1] - 1), swash)
@@ -114,16 +115,18 @@ def evaluate_inputs(derivative, model, inputs, rigging, work, tick):
 
 
 @kernel
-def set_state(point, x):
-    """Simulation state at the origin, heading north, of a linear state."""
+def set_state(point, x, seen):
+    """Simulation state at the origin, heading north, of a linear state; what stands from `seen` on is zero."""
     cp, sp = cosine_sine(0.5 * point[S.LINEAR_THETA])
     cr, sr = cosine_sine(0.5 * point[S.LINEAR_PHI])
     S.set_vector(x, S.POSITION, Vector(0.0, 0.0, 0.0))
     S.set_attitude(x, Quaternion(cr * cp, sr * cp, cr * sp, -(sr * sp)))
     S.set_vector(x, S.VELOCITY, Vector(point[S.LINEAR_U], point[S.LINEAR_V], point[S.LINEAR_W]))
     S.set_vector(x, S.RATES, Vector(point[S.LINEAR_P], point[S.LINEAR_Q], point[S.LINEAR_R]))
-    for i in range(S.BODY_SIZE, x.shape[0]):
+    for i in range(S.BODY_SIZE, seen):
         x[i] = point[i - S.BODY_SIZE + S.LINEAR_BODY_SIZE]
+    for i in range(seen, x.shape[0]):
+        x[i] = 0.0
 
 
 @kernel
@@ -146,7 +149,7 @@ def linear_rates(point, dx, out):
 @kernel
 def gather_outputs(tick, work, lane, row):
     """Outputs of one lane: linear rates, specific force, loads."""
-    size = tick.slopes.shape[1] - S.BODY_SIZE + S.LINEAR_BODY_SIZE
+    size = row.size - SPECIFIC_FORCE_SIZE - work.load_rows.shape[0]
     for i in range(size):
         row[i] = tick.slopes[2, i, lane]
     for i in range(SPECIFIC_FORCE_SIZE):

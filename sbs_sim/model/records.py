@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.model.state import BODY_SIZE
+from sbs_sim.model.state import BODY_SIZE, UNSEEN_NAMES
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -44,7 +44,9 @@ SWITCHES = {
     "stand": INTEGER,
 }
 ROTOR = {
-    "rotor_speed": LANES,  # Omega
+    "rotor_speed": LANES,  # Omega; 0 where a drive turns the rotor, whose speed is a state
+    "inflow_speed": LANES,  # Omega of the file: the scale of the inflow ratios
+    "gear": LANES,  # speed over that of the drive; 0 without one
     "radius": LANES,  # R
     "sense": LANES,  # G, +1 counter-clockwise seen from above
     "hub": VECTOR,
@@ -62,9 +64,11 @@ ROTOR = {
     "lag": INTEGER,
     "lag_rate": INTEGER,
     "inflow": INTEGER,
+    "drive": INTEGER,  # index of the drive, -1 without one
 }
 BLADE = {
     "rotor_speed": LANES,
+    "inflow_speed": LANES,
     "sense": LANES,
     "radius": LANES,
     "hub": VECTOR,
@@ -107,6 +111,33 @@ BLADE = {
     "elements": INTEGER,
     "harmonics": INTEGER,
 }
+DRIVE = {
+    "speed": LANES,  # of the first rotor in the file [rad/s]
+    "inertia": LANES,  # I_t
+    "momentum": VECTOR,  # I_t a, body axes
+    "drag": LANES,  # torque of the engine that stands still, over the speed [N m s]
+    "max_torque": LANES,
+    "max_power": LANES,
+    "inverse_lag": LANES,  # 1/s
+    "throttle": LANES,
+    "set_point": LANES,  # rad/s
+    "proportional_gain": LANES,
+    "integral_gain": LANES,  # 1/s
+    "torque_constant": LANES,  # N m / A
+    "inverse_torque_constant": LANES,
+    "conductance": LANES,  # 1 / Ohm
+    "full_voltage": LANES,
+    "voltage_drop": LANES,  # from the full battery to the empty one
+    "inverse_capacity": LANES,  # 1 / (A s)
+    "engine": INTEGER,  # see `sbs_sim.model.drive`
+    "free_wheel": INTEGER,
+    "speed_index": INTEGER,  # in the state; -1 where the drive has none
+    "torque_index": INTEGER,
+    "governor_index": INTEGER,
+    "unseen_index": INTEGER,
+}
+# a drive at work: column of its speed in the mass matrix, inertia, torques, acceleration
+SHAFT = {"force": VECTOR, "moment": VECTOR, "inverse_inertia": LANES, "torque": LANES, "acceleration": LANES}
 ELEMENT = {
     "span": LANES,  # from the flap hinge [m]
     "chord": LANES,
@@ -247,6 +278,7 @@ class Model(NamedTuple):
     ----------
     switches, air, body : structured ndarray, shape (1,)
     rotors : structured ndarray, shape (n_rotors,)
+    drives : structured ndarray, shape (n_drives,)
     blades : structured ndarray, shape (registers,)
         Blades side by side, or one blade of all flights.
     indices : StateIndices
@@ -271,6 +303,7 @@ class Model(NamedTuple):
     air: NDArray[Any]
     body: NDArray[Any]
     rotors: NDArray[Any]
+    drives: NDArray[Any]
     blades: NDArray[Any]
     indices: StateIndices
     elements: NDArray[Any]
@@ -309,6 +342,11 @@ class Work(NamedTuple):
     span : ndarray of int64, shape (2,)
         First register of blades whose terms are computed, and the one behind the last; those of the others are kept.
         All of them, except while Jacobians change the states of one rotor only.
+    turning_rotors, turning_blades : structured ndarray, shapes (n_rotors,), (registers,)
+        Of an aircraft with drives copies of the model's, for the speeds of the present state; else empty.
+    turning : ndarray, shape (3, n_rotors, n)
+        There speeds [rad/s], azimuths [rad] and angular accelerations [rad/s^2] of the rotors.
+    shafts : structured ndarray, shape (n_drives,)
     """
 
     state: Array
@@ -325,11 +363,17 @@ class Work(NamedTuple):
     loads: NDArray[Any]
     load_rows: Array
     span: IntArray
+    turning_rotors: NDArray[Any]
+    turning_blades: NDArray[Any]
+    turning: Array
+    shafts: NDArray[Any]
 
 
 def state_size(model: Model) -> int:
-    """Numbers in the state of one aircraft: of the body, of blades by flap, lag and their rates, and of the inflow."""
-    return BODY_SIZE + int(4 * model.rotors["blades"].sum() + 3 * len(model.rotors))
+    """Numbers in the state of one aircraft: of the body, of blades by flap, lag and their rates, inflow, and drives."""
+    drives = sum(int((model.drives[name] >= 0).sum()) for name in ("speed_index", "torque_index", "governor_index"))
+    unseen = len(UNSEEN_NAMES) * len(model.drives)
+    return BODY_SIZE + int(4 * model.rotors["blades"].sum() + 3 * len(model.rotors)) + drives + unseen
 
 
 def make_work(model: Model) -> Work:
@@ -340,6 +384,7 @@ def make_work(model: Model) -> Work:
     size = state_size(model)
     acceleration_rows = aligned((6, n), float)
     load_rows = aligned((LOAD_SIZE * len(rotors), n), float)
+    turning = len(model.drives) > 0
     return Work(
         state=aligned((size + 1, n), float),
         terms=records(TERMS, len(model.blades), width),
@@ -355,7 +400,17 @@ def make_work(model: Model) -> Work:
         loads=load_rows.reshape(-1).view(dtype_of(LOADS, n)),
         load_rows=load_rows,
         span=np.array([0, len(model.blades)]),
+        turning_rotors=_copied(rotors if turning else rotors[:0]),
+        turning_blades=_copied(model.blades if turning else model.blades[:0]),
+        turning=aligned((3, len(rotors) if turning else 0, n), float),
+        shafts=records(SHAFT, len(model.drives), n),
     )
+
+
+def _copied(array: NDArray[Any]) -> NDArray[Any]:
+    made = aligned(array.shape, array.dtype)
+    made[:] = array
+    return made
 
 
 class Exponential(NamedTuple):

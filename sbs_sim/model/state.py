@@ -10,6 +10,11 @@ linear state, 8 + 4 n_blades + 3 n_rotors values (38 for two three-bladed rotors
     u w q theta v p phi r | flap | flap rates | lag | lag rates | inflow
 
 Flap and lag are multiblade coordinates (theory.md section 1), inflow is lambda0, lambdas, lambdac per rotor.
+
+Drives stand behind all that (theory.md section 7.6): of each the speed of its first rotor (rad/s), with an engine its
+torque (N m), with a governor the integral part of its throttle. Behind these, and not in the linear state, follow of
+each drive the azimuth of its first rotor (rad), the share of the battery that is used up, and the share of the engine
+that has failed.
 """
 
 import re
@@ -39,10 +44,15 @@ SWASHPLATE_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic")
 COLLECTIVE, LATERAL, LONGITUDINAL = range(3)  # of SWASHPLATE_NAMES
 INFLOW_NAMES = ("lambda0", "lambdas", "lambdac")
 UNIFORM, SINE, COSINE = range(3)  # of INFLOW_NAMES
+SPEED, ENGINE_TORQUE, GOVERNOR = DRIVE_NAMES = ("Omega", "engine_torque", "governor")
+DRIVE_UNITS = {SPEED: "rad/s", ENGINE_TORQUE: "N m", GOVERNOR: "1"}
+UNSEEN_NAMES = ("azimuth", "discharge", "engine_failure")  # of a drive, and not in the linear state
+AZIMUTH, DISCHARGE, FAILURE = range(3)  # of UNSEEN_NAMES
 
 _ROTOR_STATE = re.compile(
     r"(?P<rate>d?)(?:[ab](?P<flap>\d+|d)|xi(?P<lag>0|d|\d*[cs]))\((?P<rotor>\d+)\)"
     r"|lambda(?P<inflow>[0sc])\((?P<inflow_rotor>\d+)\)"
+    r"|(?P<drive>Omega|engine_torque|governor)\(\d+\)"
 )
 
 
@@ -77,11 +87,11 @@ class Part:
     Attributes
     ----------
     family : str
-        "body", "flap", "lag" or "inflow".
+        "body", "flap", "lag", "inflow" or "drive".
     harmonic : int
         0 for body states and collective coordinates, n for the nth harmonic, -1 for the differential coordinate.
     rotor : int
-        Index of the rotor, -1 for the body.
+        Index of the rotor, -1 for the body and for drives.
     is_rate : bool
         True for the rate of a flap or lag coordinate.
     """
@@ -111,6 +121,8 @@ def part_of(name: str) -> Part:
     match = _ROTOR_STATE.fullmatch(name)
     if match is None:
         raise ValueError(f"no linear state is called {name!r}")
+    if match["drive"]:
+        return Part("drive", 0, -1)
     rotor = int(match["rotor"] or match["inflow_rotor"]) - 1
     if match["inflow"]:
         return Part("inflow", 0 if match["inflow"] == "0" else 1, rotor)
@@ -128,9 +140,12 @@ class StateLayout:
     ----------
     blades : tuple of int
         Number of blades of each rotor, in the order of the aircraft file.
+    drives : tuple of tuple of str
+        Of each drive those of `DRIVE_NAMES` that it has.
     """
 
     blades: tuple[int, ...]
+    drives: tuple[tuple[str, ...], ...] = ()
 
     @cached_property
     def blade_count(self) -> int:
@@ -140,12 +155,17 @@ class StateLayout:
     @cached_property
     def size(self) -> int:
         """Length of the simulation state."""
+        return self.drives_start + sum(map(len, self.drives)) + len(UNSEEN_NAMES) * len(self.drives)
+
+    @cached_property
+    def drives_start(self) -> int:
+        """Index of the first state of the drives: the length of the state without them."""
         return BODY_SIZE + 4 * self.blade_count + 3 * len(self.blades)
 
     @cached_property
     def linear_size(self) -> int:
         """Length of the linear state: 38 for two three-bladed rotors."""
-        return self.size - BODY_SIZE + LINEAR_BODY_SIZE
+        return self.size - len(UNSEEN_NAMES) * len(self.drives) - BODY_SIZE + LINEAR_BODY_SIZE
 
     def _multiblade(self, block: int, rotor: int) -> slice:
         first = BODY_SIZE + block * self.blade_count + sum(self.blades[:rotor])
@@ -172,16 +192,24 @@ class StateLayout:
         first = BODY_SIZE + 4 * self.blade_count + 3 * rotor
         return slice(first, first + 3)
 
+    def drive(self, drive: int) -> dict[str, int]:
+        """Indices of one drive's states in the simulation state, by the names that they have without the number."""
+        first = self.drives_start + sum(map(len, self.drives[:drive]))
+        unseen = self.drives_start + sum(map(len, self.drives)) + len(UNSEEN_NAMES) * drive
+        places = {name: first + i for i, name in enumerate(self.drives[drive])}
+        return places | {name: unseen + i for i, name in enumerate(UNSEEN_NAMES)}
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the simulation state."""
         body = ("north", "east", "down", "qw", "qx", "qy", "qz", "u", "v", "w", "p", "q", "r")
-        return body + self._rotor_names
+        unseen = [f"{name}({i + 1})" for i in range(len(self.drives)) for name in UNSEEN_NAMES]
+        return body + self._rotor_names + self._drive_names + tuple(unseen)
 
     @cached_property
     def linear_names(self) -> tuple[str, ...]:
         """Names of the linear state, in the paper's order."""
-        return LINEAR_BODY_NAMES + self._rotor_names
+        return LINEAR_BODY_NAMES + self._rotor_names + self._drive_names
 
     def has_name(self, name: str) -> bool:
         """A state or linear state has this name."""
@@ -191,13 +219,18 @@ class StateLayout:
     def linear_units(self) -> tuple[str, ...]:
         """Units of the linear state."""
         angles, rates = ("rad",) * self.blade_count, ("rad/s",) * self.blade_count
-        return LINEAR_BODY_UNITS + angles + rates + angles + rates + ("1",) * (3 * len(self.blades))
+        drives = tuple(DRIVE_UNITS[name] for names in self.drives for name in names)
+        return LINEAR_BODY_UNITS + angles + rates + angles + rates + ("1",) * (3 * len(self.blades)) + drives
 
     @cached_property
     def linear_owners(self) -> NDArray[np.int64]:
         """Number of the rotor that each linear state belongs to; that of all rotors for those of the body."""
         rotors = [part_of(name).rotor for name in self.linear_names]
         return np.array([len(self.blades) if rotor < 0 else rotor for rotor in rotors])
+
+    @cached_property
+    def _drive_names(self) -> tuple[str, ...]:
+        return tuple(f"{name}({i + 1})" for i, names in enumerate(self.drives) for name in names)
 
     @cached_property
     def _rotor_names(self) -> tuple[str, ...]:
@@ -219,7 +252,7 @@ class StateLayout:
         return tuple(names)
 
     def to_linear(self, state: Array) -> Array:
-        """Linear state of a simulation state; position and heading are left out.
+        """Linear state of a simulation state; position, heading and what drives have unseen are left out.
 
         Parameters
         ----------
@@ -231,7 +264,8 @@ class StateLayout:
         """
         u, v, w, p, q, r = state[VELOCITY : VELOCITY + 6]
         _, theta, phi = frames.quaternion_to_euler(state[ATTITUDE : ATTITUDE + 4])
-        return np.concatenate(([u, w, q, theta, v, p, phi, r], state[BODY_SIZE:]))
+        end = self.linear_size - LINEAR_BODY_SIZE + BODY_SIZE
+        return np.concatenate(([u, w, q, theta, v, p, phi, r], state[BODY_SIZE:end]))
 
     def from_linear(self, linear: Array, heading: float = 0.0) -> Array:
         """Simulation state at the origin with a given heading [rad] of a linear state.
@@ -250,7 +284,7 @@ class StateLayout:
         state = np.zeros(self.size)
         state[ATTITUDE : ATTITUDE + 4] = frames.euler_to_quaternion(heading, theta, phi)
         state[VELOCITY : VELOCITY + 6] = u, v, w, p, q, r
-        state[BODY_SIZE:] = linear[LINEAR_BODY_SIZE:]
+        state[BODY_SIZE : self.linear_size - LINEAR_BODY_SIZE + BODY_SIZE] = linear[LINEAR_BODY_SIZE:]
         return state
 
 

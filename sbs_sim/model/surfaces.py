@@ -114,7 +114,7 @@ def rotor_wash(part, ramps, rotor, flow, x):
     x : lanes, shape (size,)
         Simulation state.
     """
-    induced = rotor.rotor_speed * rotor.radius * x[rotor.inflow + S.UNIFORM]
+    induced = rotor.inflow_speed * rotor.radius * x[rotor.inflow + S.UNIFORM]
     edgewise, through = flow.velocity.x, abs(induced - flow.velocity.z)
     inverse = inverse_root(edgewise * edgewise + through * through + TINY)
     skew = angle_of(edgewise, through, inverse)

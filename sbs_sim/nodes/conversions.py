@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sbs_msgs.msg import (
     BodyState,
     Controls,
+    DriveState,
     FlightEvent,
     Inflow,
     InflowArray,
@@ -48,6 +49,7 @@ FRAME_NED = "ned"
 FRAME_BODY = "base_link_frd"
 FRAME_ODOM = "odom"
 FRAME_BASE = "base_link"
+DRIVE_FIELDS = {S.SPEED: "speed"}  # of DriveState, where they are not called as the state is
 BLADE_FIELDS = ("flap", "flap_rate", "lag", "lag_rate", "blade_flap", "blade_lag")
 HALF = math.sqrt(0.5)
 MAX_VALUE = 1e9  # of any number of a flight that can be shown
@@ -129,6 +131,7 @@ def event_message(event: Event, step_size: float) -> FlightEvent:
     if event.wind is not None:
         _fill_wind(message.wind, event.wind)
     message.wind_step, message.wind_ticks = event.wind_step, event.wind_ticks
+    message.drive, message.failure = event.drive, event.failure
     return message
 
 
@@ -243,6 +246,7 @@ class StateMessages:
         self.state = BodyState()
         self.state.header.frame_id = FRAME_NED
         self.rotors = RotorStateArray(rotors=[_rotor_at_rest(rotor) for rotor in aircraft.rotors])
+        self.rotors.drives = [DriveState() for _ in aircraft.drives]
         self.rotors.header.frame_id = FRAME_BODY
         self.inflow = InflowArray(rotors=[Inflow() for _ in range(count)])
         self.inflow.header.frame_id = FRAME_BODY
@@ -260,6 +264,8 @@ class StateMessages:
         flaps, lags = self._blades.of(snapshot)
         loads = snapshot.loads.tolist()
         azimuth = snapshot.azimuth.tolist()
+        if self._layout.drives:
+            self._fill_drives(snapshot.state)
         for j, rotor in enumerate(self.rotors.rotors):
             rotor.azimuth = azimuth[j]
             self._fill_rotor(rotor, j, snapshot.state, loads[j])
@@ -275,6 +281,13 @@ class StateMessages:
         _set_vector(body.velocity, values[7:10])
         _set_vector(body.angular_velocity, values[10:13])
         _set_vector(body.acceleration, acceleration)
+
+    def _fill_drives(self, state: Array) -> None:
+        for i, drive in enumerate(self.rotors.drives):
+            for name, place in self._layout.drive(i).items():
+                setattr(drive, DRIVE_FIELDS.get(name, name), float(state[place]))
+        for rotor, speed in zip(self.rotors.rotors, self._aircraft.rotor_speeds(state).tolist(), strict=True):
+            rotor.speed = speed
 
     def _fill_rotor(self, rotor: RotorState, j: int, state: Array, loads: list[float]) -> None:
         layout = self._layout
@@ -346,8 +359,14 @@ def snapshot_of(
     sizes = {len(values) for rotor in rotors.rotors for values in (rotor.flap_rate, rotor.lag, rotor.lag_rate)}
     if blades != layout.blades or len(inflow.rotors) != count or not sizes <= set(blades):
         raise SimulationError(f"the flight has rotors with {blades} blades, {aircraft.name} has {layout.blades}")
+    if len(rotors.drives) != len(layout.drives):
+        drives = f"{len(rotors.drives)} drives, {aircraft.name} has {len(layout.drives)}"
+        raise SimulationError(f"the flight has {drives}")
     state = np.empty(layout.size)
     state[: S.BODY_SIZE] = body_array(body)
+    for i, drive in enumerate(rotors.drives):
+        for name, place in layout.drive(i).items():
+            state[place] = getattr(drive, DRIVE_FIELDS.get(name, name))
     loads = np.zeros((count, R.LOAD_SIZE))
     for j, rotor in enumerate(rotors.rotors):
         state[layout.flap(j)], state[layout.flap_rate(j)] = rotor.flap, rotor.flap_rate

@@ -1,8 +1,8 @@
 """Node `simulator`: flies an aircraft in real time.
 
 Publishes `state`, `rotors`, `inflow`, `odom`, `clock`, `status`, `diagnostics`; subscribes `swashplate`; serves
-`pause`, `step`, `reset`, `set_wind`. The executable brings up the control mixer, the analysis and the recorder in the
-same process.
+`pause`, `step`, `reset`, `set_wind`, `engine_failure`. The executable brings up the control mixer, the analysis and the
+recorder in the same process.
 """
 
 import math
@@ -13,7 +13,7 @@ from rcl_interfaces.msg import SetParametersResult
 from std_srvs.srv import SetBool
 
 from sbs_msgs.msg import SwashplateArray
-from sbs_msgs.srv import Reset, SetWind, Step
+from sbs_msgs.srv import EngineFailure, Reset, SetWind, Step
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError, SimulationError, TrimError
@@ -92,6 +92,7 @@ class Simulator(Component):
         self.create_service(Step, "step", self._on_step, qos_profile=SERVICE_QOS)
         self.create_service(Reset, "reset", self._on_reset, qos_profile=SERVICE_QOS)
         self.create_service(SetWind, "set_wind", self._on_set_wind, qos_profile=SERVICE_QOS)
+        self.create_service(EngineFailure, "engine_failure", self._on_engine_failure, qos_profile=SERVICE_QOS)
         self.add_on_set_parameters_callback(self._on_parameters)
 
     def begin(self) -> None:
@@ -179,6 +180,14 @@ class Simulator(Component):
             self.loop.set_wind(lambda now: wind_of(request, now))
 
         return self.answer(response, set_wind, "wind set", request)
+
+    def _on_engine_failure(
+        self, request: EngineFailure.Request, response: EngineFailure.Response
+    ) -> EngineFailure.Response:
+        def fail() -> None:
+            self.loop.fail_engine(request.drive, request.failure)
+
+        return self.answer(response, fail, f"engine of drive {request.drive} set", request)
 
     def _on_parameters(self, parameters: list[Any]) -> SetParametersResult:
         """Take over what is set; rclpy has found all that came together to be within its range."""

@@ -15,7 +15,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.flight.records import Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
-from sbs_sim.nodes.conversions import BladeAngles, StateMessages, enu_flu_quaternion, to_time
+from sbs_sim.nodes.conversions import DRIVE_FIELDS, BladeAngles, StateMessages, enu_flu_quaternion, to_time
 from sbs_sim.nodes.templates import BYTE, COUNT, DOUBLE, INT, UINT, LayoutError, Template
 
 Array = NDArray[np.float64]
@@ -78,9 +78,15 @@ class StateBytes:
         layout, count = aircraft.layout, len(aircraft.rotors)
         self._size, self._count = layout.size, count
         self._blades = BladeAngles(aircraft)
-        self._speeds = np.array([rotor.speed for rotor in aircraft.rotors])
+        self._aircraft, self._speeds = aircraft, np.array([rotor.speed for rotor in aircraft.rotors])
         sizes = {"state": layout.size, "acceleration": 3, "azimuth": count, "loads": R.LOAD_SIZE * count}
-        sizes |= {"power": count, "quaternion": 4, "flap": layout.blade_count, "lag": layout.blade_count}
+        sizes |= {
+            "power": count,
+            "speed": count,
+            "quaternion": 4,
+            "flap": layout.blade_count,
+            "lag": layout.blade_count,
+        }
         ends = np.cumsum(list(sizes.values()))
         parts = zip(sizes.items(), ends.tolist(), strict=True)
         self._parts = {name: slice(end - size, end) for (name, size), end in parts}
@@ -100,6 +106,8 @@ class StateBytes:
         source[parts["acceleration"]] = snapshot.acceleration
         source[parts["azimuth"]] = snapshot.azimuth
         source[parts["loads"]] = snapshot.loads.ravel()
+        if self._aircraft.drives:
+            self._speeds = source[parts["speed"]] = self._aircraft.rotor_speeds(state)
         np.multiply(snapshot.loads[:, R.TORQUE], self._speeds, out=source[parts["power"]])
         source[parts["quaternion"]] = enu_flu_quaternion(state[S.ATTITUDE : S.VELOCITY].tolist())
         source[parts["flap"]], source[parts["lag"]] = self._blades.of(snapshot)
@@ -128,9 +136,14 @@ class StateBytes:
         yield from self._vector("acceleration", self._at("acceleration"))
 
     def _rotors_fields(self, aircraft: Aircraft) -> Iterator[tuple[str, tuple[int, float]]]:
-        first_blade = 0
+        first_blade, layout = 0, aircraft.layout
+        for i in range(len(layout.drives)):
+            for name, place in layout.drive(i).items():
+                yield f"drives[{i}].{DRIVE_FIELDS.get(name, name)}", (place, 1.0)
         for j, rotor in enumerate(aircraft.rotors):
             own = f"rotors[{j}]."
+            if layout.drives:
+                yield f"{own}speed", (self._at("speed", j), 1.0)
             yield f"{own}azimuth", (self._at("azimuth", j), 1.0)
             yield f"{own}power", (self._at("power", j), 1.0)
             for name, column in LOADS.items():

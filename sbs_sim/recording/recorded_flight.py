@@ -15,6 +15,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.content import ByContent
 from sbs_sim.errors import RecordingError
 from sbs_sim.flight.records import Event
+from sbs_sim.model.state import SPEED
 from sbs_sim.model.wind import Wind
 from sbs_sim.recording.flight_metadata import AIRCRAFT_FILE, AIRFOIL_FOLDER
 from sbs_sim.recording.flight_topics import alike
@@ -28,6 +29,7 @@ OPTIONS = {"tick": float, "azimuth_step": float, "lead_lag": bool, "cyclic_inflo
 GROUND = "ground_altitude"  # an option too; older logs have none
 WIND_VECTORS = ("velocity", "gust", "turbulence_intensity")
 WIND_NUMBERS = ("gust_delay", "gust_duration", "turbulence_length", "turbulence_airspeed", "turbulence_direction")
+EVENT_COUNTS = ("wind_step", "wind_ticks", "drive")  # older logs have none of them
 MAX_STATE_TIME = 10**17  # ns, three years of flight
 MAX_STATE_GAP = 1e4  # s without a state; to fly through a damaged time would take for ever
 
@@ -160,7 +162,8 @@ def _events(log: Log, aircraft: Aircraft) -> tuple[Event, ...]:
                 swashplate.reshape(len(aircraft.rotors), -1) if swashplate.size else None,
                 state if state.size else None,
                 _wind(topic, i) if kind in ("start", "wind") else None,
-                *(int(topic[name][i]) if name in topic else 0 for name in ("wind_step", "wind_ticks")),
+                **{name: int(topic[name][i]) for name in EVENT_COUNTS if name in topic},
+                failure=float(topic["failure"][i]) if "failure" in topic else 0.0,
             )
         )
     return tuple(found)
@@ -196,6 +199,10 @@ def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, A
             states[:, slice_of(j)] = rotors[f"rotors[{j}].{name}"][where[1]]
         for index, name in enumerate(("uniform", "sine", "cosine"), layout.inflow(j).start):
             states[:, index] = inflow[f"rotors[{j}].{name}"][where[2]]
+    for i in range(len(layout.drives)):
+        for name, place in layout.drive(i).items():
+            field = "speed" if name == SPEED else name
+            states[:, place] = rotors[f"drives[{i}].{field}"][where[1]]
     return np.round(times * 1e-9 / step_size).astype(np.int64), states
 
 

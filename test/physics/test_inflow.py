@@ -16,7 +16,7 @@ SPEED, DUCT = 287.0, 0.8
 def rotors():
     """Records of two rotors that turn clockwise and counter-clockwise, in one lane."""
     found = build(every_rotor={"duct_expansion": DUCT}).model().rotors.copy()
-    found["rotor_speed"] = SPEED
+    found["inflow_speed"] = SPEED
     return found
 
 

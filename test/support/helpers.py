@@ -15,7 +15,6 @@ from sbs_sim.lanes import as_lanes, as_records
 from sbs_sim.model import state as S
 from sbs_sim.model import wind as W
 from sbs_sim.model.average import azimuths
-from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.frames import ONE
 from sbs_sim.model.integrate import ETD, FLYING, RK4, TSIT5, advance
 
@@ -138,7 +137,7 @@ class Model:
         dx, engine = self.lanes(x), self.engine
         swash = self.no_swash if swash is None else swash
         psi = np.zeros(len(self.speeds)) if psi is None else psi
-        derivative(
+        engine.derivative(
             *(engine.model, self.lanes(x), self.lanes(swash), self.lanes(psi), self.lanes(wind), engine.work, dx, True)
         )
         return dx[:, 0].copy()

@@ -291,7 +291,7 @@ class Blade(NamedTuple):
             beta'' and xi'' of the blade, in the rotating frame [rad/s^2].
         """
         g, omega = self.rotor.rotation, self.rotor.speed
-        alpha_hub = body_rate_dot + cross(self.body_rate, g * omega * self.u)
+        alpha_hub = body_rate_dot + cross(self.body_rate, g * omega * self.u) + g * speed_rate(self.rotor) * self.u
         alpha_lag = alpha_hub - g * lag_dd * self.u - g * self.lag_rate * cross(self.w_hub, self.u)
         alpha_blade = alpha_lag + flap_dd * self.f + self.flap_rate * cross(self.w_lag, self.f)
         return (
@@ -303,6 +303,16 @@ class Blade(NamedTuple):
             + s * cross(alpha_blade, self.d)
             + s * cross(self.w_blade, cross(self.w_blade, self.d))
         )
+
+
+def speed_rate(rotor):
+    """Return Omega' [rad/s^2], which is given: 0 for rotors that have no such attribute."""
+    return getattr(rotor, "speed_rate", 0.0)
+
+
+def inflow_speed(rotor):
+    """Return the speed that makes velocities of inflow ratios [rad/s], where it is not that of the rotor."""
+    return getattr(rotor, "inflow_speed", rotor.speed)
 
 
 def make_blade(rotor, azimuth, flap, flap_rate, lag, lag_rate, body_rate):
@@ -451,7 +461,7 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
         pitch = hinge_pitch(blade, swash)[0] + along_blade(rotor, "twist", s)
         velocity = blade.velocity(s, air_velocity_hub)
         cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
-        induced = rotor.speed * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
+        induced = inflow_speed(rotor) * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
         u_t = velocity @ blade.t
         u_p = velocity @ blade.n + induced * np.cos(blade.flap)
         # The section sees the flow across the span only: |V| is the speed in the plane of t and n.
@@ -504,7 +514,7 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
     -------
     array, shape (3,)
     """
-    g, omega, radius = rotor.rotation, rotor.speed, rotor.radius
+    g, omega, radius = rotor.rotation, inflow_speed(rotor), rotor.radius
     tip_speed = omega * radius
     u = np.asarray(rotor.shaft_direction, dtype=float)
     x_hub, y_hub = hub_axes(u)
@@ -843,6 +853,7 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
         ):
             rate_list.append(rates)
             rest = accelerations - 2 * transform_d @ rates - transform_dd @ coordinates
+            rest = rest - speed_rate(rotor) * multiblade_matrix(rotor.blades, psi[j], 1) @ coordinates
             acceleration_list.append(np.linalg.solve(transform, rest))
         air_velocity_hub = air_velocity + cross(om, np.asarray(rotor.hub, dtype=float))
         inflow_rates.append(

@@ -88,7 +88,7 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
     psi = times[:, None] * np.array([rotor.speed for rotor in aircraft.rotors])
     used = used_states(point)
     a = jacobians(aircraft, point, psi, difference_steps(aircraft))[:, used][:, :, used]
-    monodromy = _transition(a, period)
+    monodromy = transition(a, period)
     multipliers = np.linalg.eigvals(monodromy).astype(complex)
     poles = np.linalg.eigvals(a.mean(axis=0)).astype(complex)
     poles = poles[np.lexsort((poles.imag, np.abs(poles)))]
@@ -119,7 +119,7 @@ def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
     raise LinearizationError(f"the blade passages of the rotors have no common period of up to {MAX_PASSAGES} of them")
 
 
-def _transition(a: Array, period: float) -> Array:
+def transition(a: Array, period: float) -> Array:
     """Transition matrix over a period of x' = A(t) x with the instants of a.
 
     Magnus' series to the fourth order with Simpson's rule, exact for a constant A (S. Blanes, F. Casas, J. A. Oteo,

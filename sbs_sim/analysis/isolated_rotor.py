@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.floquet import transition
 from sbs_sim.analysis.newton import newton
 from sbs_sim.content import ByContent
 from sbs_sim.errors import TrimError
@@ -24,8 +25,10 @@ from sbs_sim.model.steady import steady_balance
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+ComplexArray = NDArray[np.complex128]
 
 ANGLE_STEP, RATE_STEP = 1e-5, 1e-3  # of the differences: rad or inflow ratio, rad/s
+MIN_INSTANTS = 8
 START_INFLOW = 0.02  # of the tip speed
 # in the state, along and about x, y, z: position, and the vector part of the attitude, half the angle
 DEFLECTIONS = np.array([S.POSITION, S.POSITION + 1, S.POSITION + 2, S.ATTITUDE + 1, S.ATTITUDE + 2, S.ATTITUDE + 3])
@@ -88,7 +91,7 @@ class IsolatedRotor:
         self.aircraft, self.fidelity = aircraft, fidelity or Fidelity()
         self.rotor, self.layout = aircraft.rotors[0], aircraft.layout
         self._free = np.flatnonzero(aircraft.body.stand_free) if aircraft.body.is_stand else np.zeros(0, dtype=np.int64)
-        self._azimuths = azimuths(self.layout.blades, self.fidelity.azimuth_count)
+        self._azimuths = azimuths(aircraft.passages, self.fidelity.azimuth_count)
         self.places, self.rate_places = self._unknowns()
         self._scales = np.where(self.rate_places < self.layout.inflow(0).start, self.rotor.speed**2, self.rotor.speed)
         self._scales[self.rate_places < S.BODY_SIZE] = max(aircraft.environment.gravity, 1.0)
@@ -215,6 +218,44 @@ class IsolatedRotor:
             Of its n states, those of the simulation state: deflections of a stand (in rotation half the angles),
             angles, velocities of the stand, rates of the angles, inflow.
         """
+        used = self._used(inflow)
+        return self._matrices(point, used, self._azimuths).mean(axis=0), tuple(self.layout.names[i] for i in used)
+
+    def exponents(self, point: RotorPoint, azimuth_count: int = 240, *, inflow: bool = True) -> ComplexArray:
+        """Characteristic exponents of the rotor with its hub held, or on its stand, by Floquet's method.
+
+        They hold for blades that differ and for stands that are not alike along x and y, whose matrix is periodic in
+        the coordinates of this program.
+
+        Parameters
+        ----------
+        point : RotorPoint
+            Of this rotor.
+        azimuth_count : int
+            Instants of a revolution at which the rotor is linearized, even; two make a step.
+        inflow : bool
+            False holds the inflow.
+
+        Returns
+        -------
+        ndarray of complex, shape (n,)
+            log(multiplier) / period of a revolution [1/s], the fastest growing first; imaginary parts are known but for
+            multiples of the rotor's speed.
+
+        Raises
+        ------
+        TrimError
+            A count that is odd or less than 8.
+        """
+        if azimuth_count < MIN_INSTANTS or azimuth_count % 2:
+            raise TrimError(f"azimuth_count = {azimuth_count}: allowed are even numbers from {MIN_INSTANTS}")
+        period = 2.0 * np.pi / self.rotor.speed
+        a = self._matrices(point, self._used(inflow), azimuths((1,), azimuth_count))
+        found = np.log(np.linalg.eigvals(transition(a, period)).astype(complex)) / period
+        return np.asarray(found[np.argsort(-found.real)])
+
+    def _used(self, inflow: bool) -> IntArray:
+        """Indices of the states of the system matrix in the simulation state."""
         layout, index = self.layout, np.arange(self.layout.size)
         is_inflow = self.places >= layout.inflow(0).start
         deflections = DEFLECTIONS[self._free]
@@ -222,15 +263,20 @@ class IsolatedRotor:
         flap, lag = index[layout.flap_rate(0)], index[layout.lag_rate(0)]
         rates = np.concatenate([flap, lag]) if self.fidelity.lead_lag else flap
         velocities, inflows = S.VELOCITY + self._free, self.places[is_inflow] if inflow else index[:0]
-        used = np.concatenate([deflections, angles, velocities, rates, inflows])
-        steps = np.where(np.isin(used, rates), RATE_STEP * self.rotor.speed, ANGLE_STEP)
-        columns = [
-            self._mean(_moved(point.state, i, step), point.swashplate)[0]
-            - self._mean(_moved(point.state, i, -step), point.swashplate)[0]
-            for i, step in zip(used, steps, strict=True)
-        ]
-        a = np.stack([column[used] / (2.0 * step) for column, step in zip(columns, steps, strict=True)], axis=1)
-        return a, tuple(layout.names[i] for i in used)
+        return np.concatenate([deflections, angles, velocities, rates, inflows])
+
+    def _matrices(self, point: RotorPoint, used: IntArray, psi: Array) -> Array:
+        """System matrix at every azimuth, shape (m, n, n)."""
+        index, layout, columns = np.arange(self.layout.size), self.layout, []
+        rates = {*index[layout.flap_rate(0)].tolist(), *index[layout.lag_rate(0)].tolist()}
+        for i in used.tolist():
+            step = RATE_STEP * self.rotor.speed if i in rates else ANGLE_STEP
+            after, before = (
+                self._rates([_moved(point.state, i, change)] * len(psi), point.swashplate, psi)[0]
+                for change in (step, -step)
+            )
+            columns.append((after - before)[:, used] / (2.0 * step))
+        return np.stack(columns, axis=-1)
 
 
 def _with(x: Array, places: IntArray, values: Array) -> Array:

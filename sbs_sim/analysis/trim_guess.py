@@ -135,6 +135,7 @@ class MomentumRotor:
         self._droop = rotor.blades * (weight - rotor.flap_spring * rotor.flap_rest)
         pull = rotor.blade_mass * rotor.flap_hinge_offset + rotor.first_moment
         lag_offset = rotor.hinge_offset - rotor.flap_hinge_offset
+        self._lag_rest = rotor.blades * rotor.lag_spring * rotor.lag_rest
         self._lag_stiffness = rotor.blades * (rotor.lag_spring + lag_offset * pull * omega2)
         self._pitch_flap = rotor.pitch_flap_coupling
         self._phase = math.cos(rotor.swashplate_phase), math.sin(rotor.swashplate_phase)
@@ -197,7 +198,7 @@ class MomentumRotor:
             ]
         )
         collective = pitch + self._pitch_flap * coning
-        lag = torque / self._lag_stiffness if self._lag_stiffness > 0.0 else 0.0
+        lag = (torque + self._lag_rest) / self._lag_stiffness if self._lag_stiffness > 0.0 else 0.0
         inflow = v / self.tip_speed
         return Response(thrust, collective, by_collective, (coning, -aft, -side), lag, inflow, factors, slopes)
 

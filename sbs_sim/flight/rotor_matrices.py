@@ -93,7 +93,8 @@ def _rates_by_states(aircraft: "Aircraft", lead_lag: bool, cyclic_inflow: bool) 
         for part in (layout.flap_rate(j), layout.lag_rate(j)):
             steps[part.start - offset : part.stop - offset] = ANGLE_STEP * rotor.speed
         steps[layout.inflow(j).start - offset : layout.inflow(j).stop - offset] = INFLOW_STEP
-    found = engine.jacobian(point, np.eye(len(point) - size), steps, layout.linear_owners, np.zeros((1, rotors)))
+    swashplates = np.eye(len(point) - size, len(point) - size + 1)  # controls are their angles, without a constant
+    found = engine.jacobian(point, swashplates, steps, layout.linear_owners, np.zeros((1, rotors)))
     linear = np.zeros((layout.size, layout.size))
     first = S.LINEAR_BODY_SIZE
     linear[S.BODY_SIZE :, S.BODY_SIZE :] = found[0, first:size, first:size].T

@@ -8,7 +8,7 @@ from helpers import Model, build, linear_airfoil, wind_velocity
 from scipy.linalg import expm
 from test_conservation import ONE_SECOND, PSI, STEP, differences, disturbed
 
-from sbs_sim import Simulation, simulate, trim
+from sbs_sim import Aircraft, Simulation, linearize, simulate, trim
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.rotor_matrices import rotor_matrices
 from sbs_sim.flight.simulation import METHODS
@@ -482,3 +482,14 @@ def test_phase_decides_what_longitudinal_cyclic_does(sbs, hover):
     assert share == pytest.approx(1 / 3, abs=0.08)
     difference = answer(unrigged, hover, 3)
     assert abs(difference["p"]) > 2 * abs(difference["r"])
+
+
+def test_the_matrices_are_those_of_the_rotors_in_hover():
+    """Poles of each block beside those of the linear model about the trimmed hover, which is found in another way."""
+    sbs = Aircraft.load("sbs")
+    model, found = linearize(sbs), rotor_matrices(sbs, True, True, 1e-3)
+    first = S.BODY_SIZE - S.LINEAR_BODY_SIZE
+    for block, matrix in zip(found.blocks, found.linear, strict=True):
+        chosen = [i - first for i in block]
+        hover, ours = (np.sort_complex(np.linalg.eigvals(m)) for m in (model.a[np.ix_(chosen, chosen)], matrix))
+        np.testing.assert_allclose(ours, hover, rtol=1e-3, atol=0.05)

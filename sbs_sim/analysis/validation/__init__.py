@@ -21,7 +21,12 @@ from sbs_sim.errors import ValidationError
 
 __all__ = ["CASES", "MODEL", "Aim", "Case", "Report", "Row", "compared", "data", "validate"]
 
-CASES = ("pitt_peters", "castles_gray", "hammond")  # modules of this package, in the order in which they are shown
+CASES = (
+    "pitt_peters",
+    "castles_gray",
+    "hammond",
+    "uh60a",
+)  # modules of this package, in the order in which they are shown
 MODEL = (
     "One model and one set of options for all cases: rigid blades on hinges, 20 elements of a blade, airfoil tables"
     " over Reynolds number and angle of attack with smooth interpolation, dynamic inflow of Peters and HaQuang with"

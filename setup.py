@@ -38,10 +38,10 @@ EXECUTABLES = [
     "simulator = sbs_sim.nodes.executables:simulator",  # fly in real time
     "control_mixer = sbs_sim.nodes.executables:control_mixer",  # pilot controls to swashplates
     "analysis = sbs_sim.nodes.executables:analysis",  # trims, linear models and sweeps as services
-    "hover_hold = sbs_sim.nodes.executables:hover_hold",  # keep place and heading
+    "hover_hold = sbs_sim.nodes.executables:hover_hold",  # hold position and heading
     "teleop = sbs_sim.nodes.executables:teleop",  # fly by the keyboard
     "joystick = sbs_sim.nodes.executables:joystick",  # fly by a gamepad or transmitter
-    "replay = sbs_sim.nodes.executables:replay",  # publish, check, repair or fly again a log
+    "replay = sbs_sim.nodes.executables:replay",  # publish, verify, repair or re-fly a log
     "cockpit = sbs_sim.nodes.executables:cockpit",  # fly in the browser
     "trim = sbs_sim.commands.trim:main",  # trim an aircraft
     "linearize = sbs_sim.commands.linearize:main",  # linear model of a steady flight, with its modes
@@ -49,7 +49,7 @@ EXECUTABLES = [
     "batch = sbs_sim.commands.batch:main",  # Monte Carlo: many flights through turbulence
     "reproduce = sbs_sim.commands.reproduce:main",  # the paper's results beside ours
     "validate = sbs_sim.commands.validate:main",  # published results of others beside ours
-    "gusts = sbs_sim.commands.gusts:main",  # the hover hold, and how it holds in turbulence and gusts
+    "gusts = sbs_sim.commands.gusts:main",  # design the hover hold, and test it in turbulence and gusts
     "plot = sbs_sim.commands.plot:main",  # draw a log over time
 ]
 # colcon puts the executables where `ros2 run` finds them, in lib/sbs_sim. A wheel puts all into the PATH, where names

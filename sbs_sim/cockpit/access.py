@@ -84,4 +84,6 @@ def access_check(host: str) -> Iterator[None]:
     finally:
         websockets.asyncio.server.serve = serve  # type: ignore[misc]
     if not made:
-        raise SbsError("this version of viser serves its page in a way that cannot be guarded: use the pinned one")
+        raise SbsError(
+            "this version of viser serves its page in a way that cannot be protected: use the pinned version"
+        )

@@ -32,7 +32,7 @@ KEYS = (
     (("K", "Pull, nose up"), ("I", "Push, nose down")),
     (("O", "Nose right"), ("U", "Nose left")),
 )
-UNKNOWN = "what more of it does to this aircraft is not known, for it has no hover"
+UNKNOWN = "effect on this aircraft unknown, because it has no trimmed hover"
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
 RECORD, END_RECORD = "Record", "End recording"
 TRIM, LINEARIZE = "Trim here", "Linearize here"
@@ -41,11 +41,11 @@ DOUBLET, TURBULENCE, CALM = "Doublet", "Turbulence", "Calm"
 DOUBLET_OF, DOUBLET_SIZE, DOUBLET_LENGTH = 2, math.radians(0.5), 0.25  # index, rad, s of simulation time each way
 LIGHT_TURBULENCE = 0.3  # m/s
 FIRST_HINT = (
-    f"Space flies and pauses. In still air a trimmed flight may stay where it is for a minute: {DOUBLET} (B) or"
-    f" {TURBULENCE} moves it."
+    f"Space plays and pauses. In still air a trimmed flight can stay in place for a minute: {DOUBLET} (B) or"
+    f" {TURBULENCE} disturbs it."
 )
-LOG_SHOWN = "A log is shown: nothing here steers the live flight meanwhile."
-GONE = "The simulator is gone."
+LOG_SHOWN = "A log is shown: the live flight cannot be controlled from here."
+GONE = "The simulator has ended."
 
 
 class Pilot(Protocol):
@@ -58,7 +58,7 @@ class Pilot(Protocol):
         """Hold controls + change [rad], shape (4,), for a simulation time [s], then - change, then what was held."""
 
     def pause(self, paused: bool) -> Answer:
-        """Pause or go on."""
+        """Pause or resume."""
 
     def step(self, ticks: int) -> Answer:
         """Fly some ticks while paused."""
@@ -138,7 +138,7 @@ class FlyPanel:
         self._aircraft = aircraft
         axes = self._axes = axes_of(aircraft)
         self._senses = np.array([effects[i].sense for i in axes] if effects else [1.0] * len(axes))
-        self._words = [f"more of it, in hover: {effects[i].words}" if effects else UNKNOWN for i in axes]
+        self._words = [f"an increase, in hover: {effects[i].words}" if effects else UNKNOWN for i in axes]
         self._ranges = np.degrees([aircraft.controls[i].range for i in axes])
         self._labels = [control_label(aircraft.controls[i].name) for i in axes]
         self._release()
@@ -169,7 +169,7 @@ class FlyPanel:
         self._disturb = gui.add_button_group(
             "Disturb",
             (DOUBLET, TURBULENCE),
-            hint=f"longitudinal cyclic {math.degrees(DOUBLET_SIZE):g} deg up and down, {2 * DOUBLET_LENGTH:g} s in all;"
+            hint=f"doublet of {math.degrees(DOUBLET_SIZE):g} deg longitudinal cyclic in {2 * DOUBLET_LENGTH:g} s;"
             f" Dryden turbulence of {LIGHT_TURBULENCE:g} m/s",
         )
         self._disturb.on_click(lambda event: self._on_disturb(event.target.value))
@@ -189,7 +189,9 @@ class FlyPanel:
                 slider = gui.add_slider(label, low, high, SLIDER_STEP, start, hint=hint, marks=marks)
                 slider.on_update(by_user(self._on_slider))
                 self.sliders.append(slider)
-            self._hold = gui.add_checkbox("Hold", False, hint="the page keeps commanding; untick to let others fly")
+            self._hold = gui.add_checkbox(
+                "Hold", False, hint="this page keeps sending these controls; untick it to let another pilot fly"
+            )
             self._hold.on_update(by_user(self._on_hold))
 
     def _add_reset(self) -> None:
@@ -209,26 +211,26 @@ class FlyPanel:
 
     def _add_wind(self) -> None:
         gui = self._server.gui
-        with gui.add_folder("Wind, where the air goes to", expand_by_default=False):
+        with gui.add_folder("Wind, velocity of the air", expand_by_default=False):
             self._wind = [
                 gui.add_number(f"{name} [m/s]", 0.0, min=-100.0, max=100.0, step=0.5)
                 for name in ("North", "East", "Down")
             ]
             self._turbulence = gui.add_number("Turbulence, σ [m/s]", 0.0, min=0.0, max=20.0, step=0.1)
             gui.add_button("Set wind").on_click(lambda _: self._on_wind())
-        self._record = gui.add_button(RECORD, hint="begins a log of the flight as it is now, or ends the present one")
+        self._record = gui.add_button(RECORD, hint="starts a log of the flight from now on, or ends the current one")
         self._record.on_click(lambda _: self._on_record())
 
     # ----------------------------------------------------------------------------------------------------- actions
 
     def _say(self, what: str, answer: Answer) -> None:
-        """Tell what was refused."""
+        """Notify the user of a refusal."""
         done, message = answer
         if not done:
             notify(self._server, f"{what} refused", message)
 
     def go(self) -> None:
-        """Pause or go on."""
+        """Pause or resume."""
         if self._steerable:
             wanted = not self._paused
             answer = self._pilot.pause(wanted)

@@ -13,13 +13,13 @@ class Keyed(Protocol):
     """What keys can ask of what is shown."""
 
     def go(self) -> None:
-        """Pause or go on."""
+        """Pause or resume."""
 
     def step(self) -> None:
-        """Go on by the least there is."""
+        """Advance by one tick or instant."""
 
     def restart(self) -> None:
-        """Begin anew."""
+        """Reset, or go to the beginning."""
 
     def doublet(self) -> None:
         """Disturb a flight."""
@@ -38,9 +38,9 @@ def add_keys(server: ViserServer, front: Callable[[], Keyed | None]) -> None:
 
         server.gui.add_command(name, **keys).on_trigger(trigger)
 
-    add("Pause or go on", lambda keyed: keyed.go(), hotkey="space")
+    add("Play or pause", lambda keyed: keyed.go(), hotkey="space")
     add("Step", lambda keyed: keyed.step(), hotkey="N")
-    add("Reset, or to the beginning of a log", lambda keyed: keyed.restart(), hotkey="R", modifier="shift")
+    add("Reset, or rewind a log", lambda keyed: keyed.restart(), hotkey="R", modifier="shift")
     add("Doublet", lambda keyed: keyed.doublet(), hotkey="B")
     for key, name in itertools.chain.from_iterable(KEYS):
         add(name, _press(key), hotkey=key)

@@ -16,11 +16,11 @@ Array = NDArray[np.float64]
 
 TIME_STEP = 0.01  # s
 LIVE, NOTHING = "live", "choose a log"
-FLIES_ALONE = "Keys of the controls fly a live flight, not a log."
+FLIES_ALONE = "The keys of the controls act on a live flight only, not on a log."
 
 
 class LogPanel:
-    """Choice of a log, and its playing.
+    """Selection of a log, and its playback.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class LogPanel:
         gui = server.gui
         self._pick = gui.add_dropdown("Source", [self._first, *self._names()])
         self._pick.on_update(by_user(self._on_pick))
-        gui.add_button("Look for new logs").on_click(lambda _: self._refresh())
+        gui.add_button("Refresh the list").on_click(lambda _: self._refresh())
         self._times = np.zeros(1)
         self.playing = gui.add_checkbox("Play", True)
         self.rate = gui.add_dropdown("Speed ×", REAL_TIME_FACTORS[:-1], initial_value="1")
@@ -101,7 +101,7 @@ class LogPanel:
         self.moved = True
 
     def go(self) -> None:
-        """Pause or go on; from the beginning where the end is reached."""
+        """Pause or resume; start again if the end is reached."""
         at_end = self.time_slider.value >= self._times[-1] - TIME_STEP
         if at_end:
             self._move(float(self._times[0]))

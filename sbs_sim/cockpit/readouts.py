@@ -115,7 +115,7 @@ def source_line(log: str, flying: bool) -> str:
     """
     word, colour, more = ("LIVE", "#009E73", "") if flying else ("NO SIMULATOR", "#D55E00", "")
     if log:
-        word, colour, more = "LOG", "#0072B2", f"{log}, {'a live flight goes on' if flying else 'no simulator'}"
+        word, colour, more = "LOG", "#0072B2", f"{log}, {'a live flight continues' if flying else 'no simulator'}"
     mark = f"color:white;background:{colour};padding:1px 6px;border-radius:3px"
     return (
         '<div style="font:12px sans-serif;padding:6px 10px 0 10px">'

@@ -33,10 +33,12 @@ PANEL_WIDTH = 308  # pixels
 
 
 NO_FLIGHT = (
-    '<div style="font:12px sans-serif;padding:10px">No simulator flies. <b>./run simulator</b> starts one, which'
-    " comes in here by itself. <b>Logs</b> can be looked at meanwhile.</div>"
+    '<div style="font:12px sans-serif;padding:10px">No simulator is running. Start <b>./run simulator</b>:'
+    " its flight appears here. <b>Logs</b> can be viewed without it.</div>"
 )
-NO_MODEL = '<div style="font:12px sans-serif;padding:10px">No linear model yet: <b>Linearize here</b> makes one.</div>'
+NO_MODEL = (
+    '<div style="font:12px sans-serif;padding:10px">No linear model yet: <b>Linearize here</b> computes one.</div>'
+)
 
 
 @dataclass(frozen=True)
@@ -297,7 +299,7 @@ def _legend(scene: Scene) -> str:
     arrows = (
         (THRUST, "thrust of a rotor", f"1 m is {scene.newtons_per_metre:.3g} N"),
         (MOMENT, "moment on its hub", f"1 m is {scene.moment_per_metre:.3g} N m"),
-        (PATH, "tip path", "flap as magnified"),
+        (PATH, "tip path", "flap magnified"),
     )
     lines = "".join(
         f'<div><span style="display:inline-block;width:14px;height:3px;vertical-align:middle;background:rgb{colour}">'

@@ -69,7 +69,7 @@ class ViewPanel:
             MAX_MAGNIFICATION,
             0.5,
             shown.magnification,
-            hint="flap and lag angles are drawn that much larger",
+            hint="factor by which flap and lag angles are magnified",
         )
         magnification.on_update(lambda _: _magnify(shown, magnification.value))
         for field, label in (

@@ -35,33 +35,40 @@ def make_parser() -> Parser:
     parser = Parser(
         "batch",
         example="batch --flights 200 --turbulence 1.5 --spread body.mass=0.05 --csv flights.csv",
-        description="Fly many flights through turbulence, hands off: each is trimmed, keeps the controls of its trim,"
-        " and has gusts of its own. On all cores or on a cluster.",
+        description="Fly many flights through turbulence with fixed controls: each flight starts in trim, holds the"
+        " controls of its trim and has its own turbulence. Runs on all cores or on a cluster.",
     )
     group = parser.add_argument_group("flights")
-    group.add_argument("--flights", type=int, default=1000, metavar="N", help="how many (default: 1000)")
-    group.add_argument("--duration", type=float, default=3.0, metavar="X", help="of each [s] (default: 3)")
+    group.add_argument("--flights", type=int, default=1000, metavar="N", help="number of flights (default: 1000)")
     group.add_argument(
-        "--turbulence", type=float, default=1.5, metavar="X", help="standard deviation of the air [m/s] (default: 1.5)"
+        "--duration", type=float, default=3.0, metavar="X", help="duration of each flight [s] (default: 3)"
     )
-    group.add_argument("--length", type=float, default=50.0, metavar="X", help="Dryden length scale [m] (default: 50)")
-    group.add_argument("--seed", type=int, default=0, metavar="N", help="of all chance (default: 0)")
+    group.add_argument(
+        "--turbulence",
+        type=float,
+        default=1.5,
+        metavar="X",
+        help="standard deviation of the turbulence [m/s] (default: 1.5)",
+    )
+    group.add_argument("--length", type=float, default=50.0, metavar="X", help="Dryden scale length [m] (default: 50)")
+    group.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)")
     group.add_argument(
         "--spread",
         action="append",
         default=[],
         type=assignment,
         metavar="PATH=SHARE",
-        help="scatter a value of the aircraft file: body.mass=0.05 with a standard deviation of 5 %%; may be given"
-        " several times",
+        help="scatter a value of the aircraft file: body.mass=0.05 gives a standard deviation of 5 %%; may be repeated",
     )
     add_flight_arguments(parser)
     group = parser.add_argument_group("work and output")
     add_worker_arguments(group)
-    group.add_argument("--every", type=float, default=0.1, metavar="X", help="time between rows [s] (default: 0.1)")
+    group.add_argument(
+        "--every", type=float, default=0.1, metavar="X", help="time between recorded rows [s] (default: 0.1)"
+    )
     group.add_argument("--out", metavar="DIR", help="write a plot as PNG and SVG into this folder")
     group.add_argument("--csv", metavar="FILE", help="write a table of flights")
-    group.add_argument("--json", metavar="FILE", help="write all flights' values and the percentiles over time")
+    group.add_argument("--json", metavar="FILE", help="write the values of all flights and the percentiles over time")
     return parser
 
 

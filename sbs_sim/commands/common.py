@@ -90,7 +90,7 @@ def add_aircraft_arguments(parser: Parser) -> None:
         type=assignment,
         metavar="PATH=VALUE",
         help="change a value of the aircraft file: body.mass=25, rotors.radius=0.5 (of every rotor),"
-        " rotors.MR1.hub[0]=0.01; may be given several times, and is then checked together",
+        " rotors.MR1.hub[0]=0.01; may be repeated, all values are checked together",
     )
 
 
@@ -99,19 +99,22 @@ def add_flight_arguments(parser: Parser) -> None:
     add_aircraft_arguments(parser)
     group = parser.add_argument_group("flight condition, relative to the air")
     for name, unit, meaning in (
-        ("--airspeed", "m/s", "horizontal, negative is backwards"),
+        ("--airspeed", "m/s", "horizontal, negative for backward flight"),
         ("--climb-rate", "m/s", "positive up"),
-        ("--sideslip-deg", "deg", "from the heading to the track, positive to the right"),
-        ("--turn-rate-deg", "deg/s", "of the heading, positive to the right"),
+        ("--sideslip-deg", "deg", "angle from the heading to the track, positive to the right"),
+        ("--turn-rate-deg", "deg/s", "rate of the heading, positive to the right"),
     ):
         group.add_argument(name, type=float, metavar="X", help=f"{meaning} [{unit}] (default: 0)")
     group = parser.add_argument_group("fidelity")
     group.add_argument("--no-lead-lag", dest="lead_lag", action="store_false", help="hold the blades at zero lag")
     group.add_argument(
-        "--no-cyclic-inflow", dest="cyclic_inflow", action="store_false", help="hold lambdas and lambdac at zero"
+        "--no-cyclic-inflow",
+        dest="cyclic_inflow",
+        action="store_false",
+        help="hold the cyclic inflow lambdas and lambdac at zero",
     )
     group.add_argument(
-        "--azimuth-count", type=int, default=12, metavar="N", help="azimuths of the averages (default: 12)"
+        "--azimuth-count", type=int, default=12, metavar="N", help="number of azimuths to average over (default: 12)"
     )
 
 
@@ -133,12 +136,12 @@ def add_worker_arguments(group: "argparse._ArgumentGroup") -> None:
     group.add_argument(
         "--dask",
         metavar="ADDRESS",
-        help="leave the work to a dask cluster, whose scheduler is at tcp://HOST:PORT; the results are the same",
+        help="compute on a dask cluster with the scheduler at tcp://HOST:PORT; the results are the same",
     )
 
 
 def aircraft(arguments: argparse.Namespace) -> "Aircraft":
-    """The aircraft that the arguments tell."""
+    """The aircraft that the arguments select."""
     from sbs_sim.aircraft import Aircraft
 
     chosen = Aircraft.load(arguments.aircraft)

@@ -52,20 +52,19 @@ def make_parser() -> Parser:
         ("--gust-duration", 2.0, "their length [s]"),
     ):
         group.add_argument(name, type=float, default=default, metavar="X", help=f"{meaning} (default: {default:g})")
-    group.add_argument("--seed", type=int, default=0, metavar="N", help="of the turbulence (default: 0)")
+    group.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the turbulence (default: 0)")
     group = parser.add_argument_group("flight")
     group.add_argument(
         "--duration", type=float, default=60.0, metavar="T", help="flight in turbulence [s] (default: 60)"
     )
-    group.add_argument("--delay", type=int, default=0, metavar="N", help="ticks that controls come late (default: 0)")
+    group.add_argument("--delay", type=int, default=0, metavar="N", help="delay of the controls [ticks] (default: 0)")
     group.add_argument(
         "--limit",
         action="append",
         default=[],
         type=_limit,
         metavar="NAME=VALUE",
-        help="departure that costs as much as any other at its limit, such as forward=0.3 [m, m/s] or heading_deg=5;"
-        " may be given several times",
+        help="deviation with unit cost, such as forward=0.3 [m, m/s] or heading_deg=5; may be repeated",
     )
     parser.add_argument("--json", metavar="FILE", help="write the results")
     return parser

@@ -54,10 +54,12 @@ def make_parser() -> Parser:
         "--method",
         choices=("averaged", "paper"),
         default="averaged",
-        help="differences of the averaged model (default), or term by term as the paper does",
+        help="finite differences of the averaged model (default), or term by term as in the paper",
     )
     group.add_argument(
-        "--quasi-static", action="store_true", help="the eight body states only, with rotors and inflow settled"
+        "--quasi-static",
+        action="store_true",
+        help="reduce to the eight body states, with quasi-static rotors and inflow",
     )
     group = parser.add_argument_group("output")
     for name, meaning in (

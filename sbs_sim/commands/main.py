@@ -14,15 +14,15 @@ EXECUTABLES = {
     "batch": ("sbs_sim.commands.batch:main", "Monte Carlo: many flights through turbulence"),
     "reproduce": ("sbs_sim.commands.reproduce:main", "the paper's results beside ours"),
     "validate": ("sbs_sim.commands.validate:main", "published results of others beside ours"),
-    "gusts": ("sbs_sim.commands.gusts:main", "the hover hold, and how it holds in turbulence and gusts"),
+    "gusts": ("sbs_sim.commands.gusts:main", "design the hover hold, and test it in turbulence and gusts"),
     "plot": ("sbs_sim.commands.plot:main", "draw a log over time"),
     "simulator": ("sbs_sim.nodes.executables:simulator", "fly in real time (ROS 2)"),
     "control_mixer": ("sbs_sim.nodes.executables:control_mixer", "pilot controls to swashplates (ROS 2)"),
     "analysis": ("sbs_sim.nodes.executables:analysis", "trims, linear models and sweeps as services (ROS 2)"),
-    "hover_hold": ("sbs_sim.nodes.executables:hover_hold", "keep place and heading (ROS 2)"),
+    "hover_hold": ("sbs_sim.nodes.executables:hover_hold", "hold position and heading (ROS 2)"),
     "teleop": ("sbs_sim.nodes.executables:teleop", "fly by the keyboard (ROS 2)"),
     "joystick": ("sbs_sim.nodes.executables:joystick", "fly by a gamepad or transmitter (ROS 2)"),
-    "replay": ("sbs_sim.nodes.executables:replay", "publish, check, repair or fly again a log (ROS 2)"),
+    "replay": ("sbs_sim.nodes.executables:replay", "publish, verify, repair or re-fly a log (ROS 2)"),
     "cockpit": ("sbs_sim.nodes.executables:cockpit", "fly in the browser (ROS 2)"),
 }
 COMPLETION = "completion"

@@ -26,10 +26,10 @@ def make_parser() -> Parser:
         type=Path,
         action="append",
         metavar="FILE",
-        help=".png, .svg or .html; may be given several times (default: the log's name with .png)",
+        help=".png, .svg or .html; may be repeated (default: the log's name with .png)",
     )
     parser.add_argument(
-        "--flight", type=int, metavar="NUMBER", help="which flight of a file that was made of several, from 1"
+        "--flight", type=int, metavar="NUMBER", help="which flight of a file with several flights, from 1"
     )
     return parser
 

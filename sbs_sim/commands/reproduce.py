@@ -26,13 +26,18 @@ def make_parser() -> Parser:
         "reproduce",
         example="reproduce --out report",
         description="Compute the paper's Tables 1 to 5, its inflow poles and its trims, and print them beside the"
-        " printed values, with their ratios; remarks say why something differs.",
+        " printed values, with their ratios. Remarks give the reasons for differences.",
     )
     parser.add_argument(
-        "--aircraft", metavar="NAME", help="the complete model (default: sbs without lag dampers; the paper names none)"
+        "--aircraft",
+        metavar="NAME",
+        help="aircraft of the complete model (default: sbs without lag dampers, of which the paper has none)",
     )
     parser.add_argument(
-        "--paper-aircraft", default="sbs_paper", metavar="NAME", help="the paper's reading (default: sbs_paper)"
+        "--paper-aircraft",
+        default="sbs_paper",
+        metavar="NAME",
+        help="aircraft of the paper's reading (default: sbs_paper)",
     )
     parser.add_argument("--json", metavar="FILE", help="also write everything to this file")
     parser.add_argument(

@@ -55,12 +55,14 @@ def make_parser() -> Parser:
         help=f"{', '.join(TYPED)}, or the path of a value of the aircraft file: body.mass, rotors.blade_mass (of every"
         " rotor), rotors[0].radius",
     )
-    parser.add_argument("range", nargs="*", type=float, metavar="START STOP COUNT", help="evenly spaced, ends included")
-    parser.add_argument("--values", nargs="+", type=float, metavar="X", help="instead of a range")
+    parser.add_argument(
+        "range", nargs="*", type=float, metavar="START STOP COUNT", help="COUNT evenly spaced values from START to STOP"
+    )
+    parser.add_argument("--values", nargs="+", type=float, metavar="X", help="values instead of a range")
     add_flight_arguments(parser)
     add_guess_argument(parser)
     group = parser.add_argument_group("work and output")
-    group.add_argument("--trims-only", dest="linear", action="store_false", help="no linear models")
+    group.add_argument("--trims-only", dest="linear", action="store_false", help="compute trims without linear models")
     add_worker_arguments(group)
     group.add_argument("--out", metavar="DIR", help="write plots as PNG and SVG into this folder")
     group.add_argument("--csv", metavar="FILE", help="write a table of trims and poles, in SI units and radians")

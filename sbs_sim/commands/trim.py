@@ -78,7 +78,7 @@ def print_trim(craft: "Aircraft", point: "TrimPoint", effects: "Sequence[Control
         low, high = (control.shown(limit) for limit in control.range)
         heading, moves = f"{control.name} [{control.shown_unit}]", f"{effect.axis}: {effect.words}"
         rows.append([heading, fixed(control.shown(value), 4), f"{low:g} to {high:g}", moves])
-    print_table(["body and controls", "", "range", "more of it"], rows, left=(0, 3))
+    print_table(["body and controls", "", "range", "effect of an increase"], rows, left=(0, 3))
     print()
     print_table(["rotors", *(rotor.name for rotor in craft.rotors)], _rotor_rows(craft, point))
     print()

@@ -1,8 +1,8 @@
 """Node `analysis`: trims, linear models and sweeps as services and an action.
 
 Serves `trim`, `linearize` and the action `sweep`; publishes the latest results of the services on `trim_point` and
-`linear_model`, for those who come later too. Answers take milliseconds and are given one after the other; a sweep has
-a thread of its own.
+`linear_model`, also for late subscribers. Requests are answered in turn, within milliseconds; a sweep has a thread of
+its own.
 """
 
 import contextlib

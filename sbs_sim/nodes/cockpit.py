@@ -1,7 +1,6 @@
 """Executable `cockpit`: a flight in the browser.
 
-Starts a simulator in a process of its own, so that drawing never takes the flight's time, or joins one that flies
-already. What is slow to import is imported when the command line is known to be right.
+Starts a simulator in a process of its own, so that drawing does not delay the flight, or joins a running one.
 """
 
 import argparse
@@ -132,7 +131,9 @@ def main(args: list[str] | None = None) -> None:
     options = _parse(own)
     ros_arguments = arguments[1 + len(own) :]
     if (options.attach or options.logs) and (given := {"-p", "--param", "--params-file"} & set(ros_arguments)):
-        make_parser().error(f"{min(given)}: parameters are those of a simulator: not allowed with --attach and --logs")
+        make_parser().error(
+            f"{min(given)}: parameters go to a simulator that the cockpit starts: not allowed with --attach and --logs"
+        )
     end = threading.Event()
     start = CockpitStartup(options, ros_arguments, end)
     code = run(start.nodes, [arguments[0], *ros_arguments], end, first="cockpit")
@@ -166,13 +167,15 @@ def make_parser() -> Parser:
     """Command line of `cockpit`."""
     parser = Parser(
         "cockpit",
-        description="Fly in the browser: starts a simulator and serves a page that shows and steers it.",
-        epilog="What follows --ros-args goes to the simulator too: ./run cockpit --ros-args -p airspeed:=15.0",
+        description="Fly in the browser: start a simulator and serve a page that shows and controls the flight.",
+        epilog="Arguments after --ros-args go to the simulator too: ./run cockpit --ros-args -p airspeed:=15.0",
     )
     parser.add_argument("--host", default=HOST, help=f"address to serve on (default: {HOST}, this machine only)")
-    parser.add_argument("--port", type=int, default=PORT, help=f"1 to 65535 (default: {PORT})")
-    parser.add_argument("--attach", action="store_true", help="start no simulator: join one that flies, now or later")
-    parser.add_argument("--logs", default="", metavar="FOLDER", help="start no simulator; show the logs of this folder")
+    parser.add_argument("--port", type=int, default=PORT, help=f"port to serve on, 1 to 65535 (default: {PORT})")
+    parser.add_argument(
+        "--attach", action="store_true", help="join a simulator that is running or is started later; start none"
+    )
+    parser.add_argument("--logs", default="", metavar="FOLDER", help="show the logs of this folder; start no simulator")
     return parser
 
 
@@ -193,4 +196,4 @@ def _refuse_second_simulator(lookout: Component, until: float) -> None:
         if (left := until - time.monotonic()) <= 0.0:
             return
         time.sleep(min(left, 0.05))
-    raise SbsError("a simulator is flying already: --attach joins it, another ROS_DOMAIN_ID keeps apart from it")
+    raise SbsError("a simulator is already running: join it with --attach, or use another ROS_DOMAIN_ID")

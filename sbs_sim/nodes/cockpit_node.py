@@ -1,4 +1,4 @@
-"""Node `cockpit`: a page in the browser that shows a flight and flies it.
+"""Node `cockpit`: a page in the browser that shows and controls a flight.
 
 Subscribes `state`, `rotors`, `inflow`, `events`, `status`, `linear_model`; publishes `controls`; calls `pause`, `step`,
 `reset`, `set_wind`, `trim`, `linearize`, and sets the simulator's `real_time_factor`.
@@ -87,7 +87,7 @@ class Cockpit(Component):
         self.create_subscription(LinearModel, "linear_model", self._on_model, LATCHED_QOS)
         for thread in os.listdir("/proc/self/task"):  # the kernel knows priorities of threads alone; others inherit
             os.setpriority(os.PRIO_PROCESS, int(thread), NICE)
-        for name, work in (("drawing", self._show), ("lookout", self._look_out)):
+        for name, work in (("drawing", self._show), ("monitor", self._monitor)):
             self.workers.append(threading.Thread(target=work, name=name, daemon=True))
         for worker in self.workers:
             worker.start()
@@ -165,7 +165,7 @@ class Cockpit(Component):
                 return True
         return False
 
-    def _look_out(self) -> None:
+    def _monitor(self) -> None:
         """Find out what is flown whenever a simulator is discovered."""
         known = False
         while not self._end.wait(POLL_PERIOD):
@@ -186,7 +186,7 @@ class Cockpit(Component):
         try:
             return linearize(aircraft).control_effects
         except SbsError as error:
-            self.get_logger().warning(f"which way the keys move {aircraft.name} is not known: {error}")
+            self.get_logger().warning(f"the effects of the keys on {aircraft.name} are unknown: {error}")
             return ()
 
     def _draw_all(self) -> None:

@@ -1,8 +1,8 @@
-"""Node `hover_hold`: keeps position and heading; the worked example of what `linearize` is good for (docs/tutorial.md).
+"""Node `hover_hold`: holds position and heading; an example of control design with `linearize` (docs/tutorial.md).
 
-Calls `linearize`, designs the gains and prints them; from then on every `state` is answered by `controls`. Subscribes
-`target` (where to go; at first it stays where it is), `events` for resets and `status` for pauses; publishes
-`diagnostics`.
+Calls `linearize`, designs the gains and prints them. It then answers every `state` with `controls`. Subscribes `target`
+(position and heading to hold; at the start those of the aircraft), `events` for resets and `status` for pauses;
+publishes `diagnostics`.
 """
 
 import math
@@ -32,7 +32,7 @@ PARAMETERS = {
     "patience": Parameter(60.0, "How long to wait for the service linearize [s]", 1.0, 3600.0),
     "position_limit": Parameter(
         LIMITS["forward"],
-        "Position error that costs as much as the other errors at their limits [m]; less is tighter",
+        "Position error with unit cost, as the other errors have at their limits [m]; smaller holds more tightly",
         0.05,
         10.0,
     ),

@@ -1,6 +1,6 @@
-"""Node `joystick`: flies by the messages of the ROS package `joy` (sensor_msgs/Joy on `joy`).
+"""Node `joystick`: flies with the messages of the ROS package `joy` (sensor_msgs/Joy on `joy`).
 
-config/joystick.yaml says what the axes and buttons of a pad mean.
+config/joystick.yaml assigns the axes and buttons of each pad.
 """
 
 import sys
@@ -21,7 +21,7 @@ from sbs_sim.pilot.joystick import Joystick, JoystickFile
 PARAMETERS = {
     **STICK_PARAMETERS,
     "config": Parameter("", "Joystick file; empty for config/joystick.yaml of the package"),
-    "pad": Parameter("gamepad", "Which of its pads: gamepad, xbox, playstation, transmitter"),
+    "pad": Parameter("gamepad", "Pad of this file: gamepad, xbox, playstation, transmitter"),
 }
 
 

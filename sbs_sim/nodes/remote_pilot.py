@@ -136,7 +136,7 @@ class RemotePilot:
             self._held = doublet.before
 
     def pause(self, paused: bool) -> Answer:
-        """Pause or go on."""
+        """Pause or resume."""
         return self._ask("pause", SetBool.Request(data=paused))
 
     def step(self, ticks: int) -> Answer:

@@ -1,7 +1,7 @@
-"""Executable `replay`: a log as topics again, checked, repaired, or flown again.
+"""Executable `replay`: publishes a log, verifies it, repairs it, or flies its commands again.
 
 Without an option it publishes the recorded topics with the recorded timing, `/clock` included, and serves `pause`. It
-reads logs of other writers too, as long as their message types are installed.
+also reads logs of other writers if their message types are installed.
 """
 
 import argparse
@@ -71,19 +71,21 @@ def make_parser() -> Parser:
     parser = Parser(
         "replay",
         example="replay bags/hover_step.mcap --rate 0.5",
-        description="Publish, check, repair or fly again a log.",
+        description="Publish, verify, repair or re-fly a log.",
     )
     parser.add_argument("file", type=Path, help="MCAP log")
-    parser.add_argument("--rate", type=float, default=1.0, help="recorded time over wall time, 0.001 to 1000")
-    parser.add_argument("--start", type=float, default=0.0, help="where to begin [s after the first message]")
+    parser.add_argument("--rate", type=float, default=1.0, help="recorded time over elapsed time, 0.001 to 1000")
+    parser.add_argument("--start", type=float, default=0.0, help="start time [s after the first message]")
     parser.add_argument(
-        "--end", type=float, default=float("inf"), help="where to end [s after the first message]; with --set too"
+        "--end", type=float, default=float("inf"), help="end time [s after the first message]; also with --set"
     )
     parser.add_argument(
-        "--flight", type=int, metavar="NUMBER", help="which flight of a file that was made of several, from 1"
+        "--flight", type=int, metavar="NUMBER", help="which flight of a file with several flights, from 1"
     )
-    parser.add_argument("--loop", action="store_true", help="begin again at the end")
-    parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, all if not given; after FILE")
+    parser.add_argument("--loop", action="store_true", help="start again at the end")
+    parser.add_argument(
+        "--topics", nargs="+", default=[], help="topics to publish (default: all); give them after FILE"
+    )
     parser.add_argument(
         "--delay",
         type=float,
@@ -91,14 +93,14 @@ def make_parser() -> Parser:
         help=f"longest wait for a subscriber on every topic before the first message [s]; at least {DISCOVERY_TIME:g}",
     )
     one = parser.add_mutually_exclusive_group()
-    one.add_argument("--verify", action="store_true", help="fly the log again and compare every state bit for bit")
+    one.add_argument("--verify", action="store_true", help="repeat the flight and compare every state bit for bit")
     one.add_argument("--recover", action="store_true", help="rewrite a truncated or damaged log")
     one.add_argument(
         "--set",
         dest="changes",
         action="append",
         metavar="PATH=VALUE",
-        help="fly the commands with a changed aircraft: body.mass=25; may be given several times, and is then checked"
+        help="fly the recorded commands with a changed aircraft: body.mass=25; may be repeated, all values are checked"
         " together",
     )
     parser.hidden(one, OLD_OPTION_NAMES[0], OPTION_NAMES[0])
@@ -106,7 +108,7 @@ def make_parser() -> Parser:
         "--out",
         default="",
         metavar="FILE",
-        help="log to write, a file or a folder (default: FILE.recovered.mcap, or one named after the time)",
+        help="log to write: a file or a folder (default: FILE.recovered.mcap, or a name with the time)",
     )
     parser.hidden(parser, OLD_OPTION_NAMES[1], OPTION_NAMES[1])
     return parser

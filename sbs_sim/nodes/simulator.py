@@ -39,27 +39,33 @@ SWITCH_INTERVAL = 0.5e-3
 COMPONENTS = ("simulator", "control_mixer", "analysis", "recorder")
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
-    "components": Parameter(list(COMPONENTS), f"What to bring up in this process: {', '.join(COMPONENTS)}"),
-    "airspeed": Parameter(0.0, "Start: horizontal velocity relative to the air [m/s]", -100.0, 100.0),
-    "climb_rate": Parameter(0.0, "Start: vertical velocity relative to the air, up positive [m/s]", -50.0, 50.0),
-    "sideslip": Parameter(0.0, "Start: angle from heading to track, right positive [rad]", -math.pi, math.pi),
-    "turn_rate": Parameter(0.0, "Start: rate of the heading, right positive [rad/s]", -3.0, 3.0),
-    "heading": Parameter(0.0, "Start: heading, from north to east [rad]", -math.pi, math.pi),
-    "altitude": Parameter(0.0, "Start: height above the origin [m]", -1e5, 1e5),
+    "components": Parameter(list(COMPONENTS), f"Nodes in this process, of {', '.join(COMPONENTS)}"),
+    "airspeed": Parameter(
+        0.0, "At the start: horizontal velocity relative to the air, forward positive [m/s]", -100.0, 100.0
+    ),
+    "climb_rate": Parameter(0.0, "At the start: vertical velocity relative to the air, up positive [m/s]", -50.0, 50.0),
+    "sideslip": Parameter(0.0, "At the start: angle from heading to track, right positive [rad]", -math.pi, math.pi),
+    "turn_rate": Parameter(0.0, "At the start: rate of the heading, right positive [rad/s]", -3.0, 3.0),
+    "heading": Parameter(0.0, "At the start: heading, from north to east [rad]", -math.pi, math.pi),
+    "altitude": Parameter(0.0, "At the start: height above the origin [m]", -1e5, 1e5),
     "ground_altitude": Parameter(
-        -100.0, "Height of level ground above the origin [m]; touching it ends the flight until a reset", -1e5, 1e5
+        -100.0, "Height of the level ground above the origin [m]; contact stops the flight until a reset", -1e5, 1e5
     ),
     "real_time_factor": Parameter(
-        1.0, "Simulation time over wall time; 0 is as fast as possible", 0.0, 1000.0, fixed=False
+        1.0, "Simulation time over elapsed time; 0 is as fast as possible", 0.0, 1000.0, fixed=False
     ),
-    "publish_rate": Parameter(100.0, "Ticks, and messages on every state topic, per simulated second [Hz]", 1.0, 1e4),
-    "method": Parameter(METHOD, f"Integration: {', '.join(METHODS)}"),
-    "azimuth_step_deg": Parameter(AZIMUTH_STEP_DEG, "Largest step of the fastest rotor's azimuth [deg]", 0.01, 45.0),
-    "lead_lag": Parameter(True, "Blades lead and lag"),
-    "cyclic_inflow": Parameter(True, "Inflow has its sine and cosine parts"),
+    "publish_rate": Parameter(
+        100.0, "Rate of ticks and of the messages on every state topic, in simulation time [Hz]", 1.0, 1e4
+    ),
+    "method": Parameter(METHOD, f"Integration method: {', '.join(METHODS)}"),
+    "azimuth_step_deg": Parameter(
+        AZIMUTH_STEP_DEG, "Largest integration step, as azimuth of the fastest rotor [deg]", 0.01, 45.0
+    ),
+    "lead_lag": Parameter(True, "Model the lead-lag motion of the blades"),
+    "cyclic_inflow": Parameter(True, "Model the sine and cosine parts of the inflow"),
     "command_timeout": Parameter(
         0.5,
-        "Age of a command beyond which a warning is given [s of simulation time]; 0 is never",
+        "Age of a command above which a warning is given [s of simulation time]; 0 disables it",
         0.0,
         1e6,
         fixed=False,
@@ -67,7 +73,7 @@ PARAMETERS = {
     "record": Parameter(
         "", "Log of the flight: a file, an existing folder, empty for bags/<date>_<time>_<aircraft>.mcap, or off"
     ),
-    "wind": Parameter([0.0, 0.0, 0.0], "Steady wind: north, east, down, where the air goes to [m/s]"),
+    "wind": Parameter([0.0, 0.0, 0.0], "Steady wind: velocity of the air, north, east, down [m/s]"),
 }
 
 

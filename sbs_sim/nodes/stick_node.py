@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 STICK_PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
-    "augmentation": Parameter(True, "Stability augmentation is on at the start"),
+    "augmentation": Parameter(True, "Start with stability augmentation"),
 }
 SETTLING_TIME = 0.3  # s of wall time in which the events of the flight so far arrive
 

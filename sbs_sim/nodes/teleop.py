@@ -1,4 +1,4 @@
-"""Node `teleop`: flies by keys that are pressed in its terminal."""
+"""Node `teleop`: flies with the keys that are pressed in its terminal."""
 
 import contextlib
 import math
@@ -25,11 +25,11 @@ from sbs_sim.pilot.sticks import KeySticks, keys_of, shaped
 
 PARAMETERS = {
     **STICK_PARAMETERS,
-    "expo": Parameter(0.3, "Exponential of the sticks: 0 linear, 1 cubic", 0.0, 1.0),
-    "collective_deg": Parameter(3.0, "Departure of the collective from its trim at full stick [deg]", 0.1, 20.0),
-    "cyclic_deg": Parameter(2.0, "Departure of the cyclics from their trim at full stick [deg]", 0.1, 20.0),
+    "expo": Parameter(0.3, "Exponential response of the sticks: 0 linear, 1 cubic", 0.0, 1.0),
+    "collective_deg": Parameter(3.0, "Change of the collective from its trim at full stick [deg]", 0.1, 20.0),
+    "cyclic_deg": Parameter(2.0, "Change of the cyclics from their trim at full stick [deg]", 0.1, 20.0),
     "differential_deg": Parameter(
-        3.0, "Departure of the differential cyclic from its trim at full stick [deg]", 0.1, 20.0
+        3.0, "Change of the differential cyclic from its trim at full stick [deg]", 0.1, 20.0
     ),
 }
 HELP = """w s  collective up, down           arrows or i k j l  cyclic: push, pull, left, right

@@ -12,7 +12,7 @@ from sbs_sim.nodes.parameters import Parameter
 from sbs_sim.terminal import command_line
 
 WIDTH = 100
-# Nodes that an executable brings up with its own.
+# Nodes that an executable starts in its process.
 WITH = {"simulator": ("simulator", "control_mixer", "analysis", "recorder")}
 EXAMPLES = {
     "simulator": "simulator --ros-args -p airspeed:=15.0 -p record:=off",
@@ -43,7 +43,10 @@ def text(name: str) -> str:
         parts = [f"usage: {call} [--help] [--version] [--ros-args -p NAME:=VALUE ...]"]
     parts.append(_docstring(name).rstrip())
     if name in WITH:
-        parts.append(f"It brings up {', '.join(WITH[name])} in one process; the parameter components chooses.")
+        nodes = f"{', '.join(WITH[name][:-1])} and {WITH[name][-1]}"
+        parts.append(
+            f"The executable starts the nodes {nodes} in one process; the parameter `components` selects them."
+        )
     parts += _endpoints([item for item in endpoints() if set(WITH.get(name, (name,))) & set(item.nodes)])
     if parameters := getattr(module, "PARAMETERS", None):
         parts.append(

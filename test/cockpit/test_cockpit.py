@@ -474,7 +474,7 @@ def end_of_cockpit(*arguments, domain=0):
         (["--logs"], "--logs: expected one argument"),
         (
             ["--attach", "--ros-args", "-p", "airspeed:=9.0"],
-            "-p: parameters are those of a simulator: not allowed with",
+            "-p: parameters go to a simulator that the cockpit starts: not allowed with",
         ),
     ],
 )
@@ -509,7 +509,7 @@ def test_a_folder_that_is_not_there_is_told_in_one_line(tmp_path):
 def test_the_page_says_what_it_shows():
     assert "LIVE" in source_line("", True)
     assert "NO SIMULATOR" in source_line("", False)
-    for flying, text in ((True, "a live flight goes on"), (False, "no simulator")):
+    for flying, text in ((True, "a live flight continues"), (False, "no simulator")):
         line = source_line("a<b.mcap", flying)
         assert "LOG" in line
         assert f"a&lt;b.mcap, {text}" in line
@@ -825,11 +825,11 @@ def test_keys_of_the_page_do_what_they_say_on_any_aircraft(file):
         hints = [slider.hint for slider in panel.sliders]
         said = [effect.words for effect in model.control_effects]
         assert hints == [
-            f"more of it, in hover: {words}. Keys {less}, {more}"
+            f"an increase, in hover: {words}. Keys {less}, {more}"
             for words, ((less, _), (more, _)) in zip(said, KEYS, strict=True)
         ]
         panel.use(aircraft, ())
-        assert all("not known" in slider.hint for slider in panel.sliders)
+        assert all("unknown" in slider.hint for slider in panel.sliders)
     finally:
         server.stop()
 
@@ -1050,7 +1050,7 @@ def test_in_the_view_of_a_log_keys_move_the_log_and_not_the_hidden_flight(flying
     page.keyboard.press("n")
     page.get_by_text("hover_step.mcap paused").wait_for(timeout=1e3 * PATIENCE)
     page.get_by_role("tab", name="Fly").click()
-    page.get_by_text("nothing here steers the live flight").wait_for(timeout=1e3 * PATIENCE)
+    page.get_by_text("the live flight cannot be controlled").wait_for(timeout=1e3 * PATIENCE)
     assert page.get_by_role("slider").count() == 0
     made.client.spin(0.5)
     assert len(made.client.messages["events"]) == before
@@ -1067,7 +1067,7 @@ def test_in_the_view_of_a_log_keys_move_the_log_and_not_the_hidden_flight(flying
 def test_a_log_that_is_none_is_refused_and_the_view_stays(flying, page):
     made, _, _ = flying
     (made.folder / "bags" / "broken.mcap").write_bytes(b"nothing")
-    button(page, "Look for new logs").click()
+    button(page, "Refresh the list").click()
     choose(page, "broken.mcap", "Log refused")
     assert page.get_by_text("hover_step.mcap paused").count() == 1
 
@@ -1095,24 +1095,24 @@ def test_logs_are_shown_without_a_simulator_and_a_live_flight_when_there_is_one(
             page.get_by_text(text).first.wait_for(timeout=1e3 * PATIENCE)
 
         shown("NO SIMULATOR")
-        shown("No simulator flies")
+        shown("No simulator is running")
         page.get_by_role("tab", name="Logs").click()
         choose(page, "hover_step.mcap", "hover_step.mcap, no simulator")
         shown("hover_step.mcap paused")  # at its end
         path = logs / f"{HOSTILE.replace('/', '|')}.mcap"
         simulator = made.start("simulator", aircraft=hostile_aircraft(tmp_path), record=f"'{path}'")
-        shown("hover_step.mcap, a live flight goes on")
+        shown("hover_step.mcap, a live flight continues")
         choose(page, "live", "LIVE")
         shown(f"{HOSTILE} playing")
         simulator.interrupt()
         shown("NO SIMULATOR")
 
         # texts of others are no markup: of the log's file, of the aircraft in it, of the message of whoever publishes
-        button(page, "Look for new logs").click()
+        button(page, "Refresh the list").click()
         choose(page, path.name, f"{path.name} paused")
         shown(f"{HOSTILE}, ")
         (logs / f"broken {path.name}").write_bytes(b"nothing")
-        button(page, "Look for new logs").click()
+        button(page, "Refresh the list").click()
         choose(page, f"broken {path.name}", "Log refused")
         model = LinearModel(method=HOSTILE)
         model.modes = [Mode(name=HOSTILE, real=-0.1, imag=0.5)]

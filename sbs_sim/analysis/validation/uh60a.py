@@ -21,8 +21,8 @@ REMARKS = (
     " Its wash and that on the fuselage are those of NASA CR-166309, not the charts of NASA TM-84281 that the source"
     " uses. Without wash on the fuselage the attitude rises by 0.8 deg, without wash on the stabilator by 1.2 deg at"
     " 40 kt, and without stabilator it is 4.4 and 4.2 deg.",
-    "L_p with this program's inflow: its cyclic parts follow the moments of the blades and lower the Lock number that the"
-    " disc feels by 1 + a sigma / (16 lambda) = 1.55 (Curtiss). The source has uniform inflow; with that alone, and"
+    "L_p with this program's inflow: its cyclic parts follow the moments of the blades and lower the Lock number that"
+    " the disc feels by 1 + a sigma / (16 lambda) = 1.55 (Curtiss). The source has uniform inflow; with that alone, and"
     " without lag, the damping agrees.",
     "Y_v and N_v: the side force of the fuselage in the wash of the hovering rotor, whose tables are used at -90 deg of"
     " angle of attack, far from the wind tunnel's: without it Y_v is -0.035 and N_v 0.017. The rest of N_v is the side"
@@ -45,7 +45,7 @@ def case() -> Case:
             "Wash of the rotor, dynamic pressure at the tails, fin and positions: NASA CR-166309 (Howlett 1981).",
             "Lag hinges, springs, dampers and the mass of the blades: the same; the source has no lag.",
             "Tail rotor: blades on hinges at 0.1 m for the flexible beam; density of sea level, which is not printed.",
-            "Stabilator: its schedule along the collective of these trims, without pitch rate and lateral acceleration.",
+            "Stabilator: its schedule along the collective of these trims, not of pitch rate and lateral acceleration.",
         ),
         rows=(*_trim_rows(craft, published), *_derivative_rows(craft, published)),
         remarks=REMARKS,

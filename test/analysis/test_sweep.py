@@ -177,7 +177,7 @@ def test_a_sweep_of_failures_only(sbs):
             [0.0],
             {},
             "parameter 'body.weight': allowed are airspeed, climb_rate, sideslip, turn_rate or a path;"
-            " body.weight: unknown key, allowed are mass, inertia, flat_plate_areas, surfaces, fuselage",
+            " body.weight: unknown key, allowed are mass, inertia, flat_plate_areas, surfaces, fuselage, stand",
         ),
     ],
 )

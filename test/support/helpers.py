@@ -247,7 +247,26 @@ def mirrored_data(data):
         rotor["hub"] = (POLAR * rotor["hub"]).tolist()
         rotor["shaft_direction"] = (POLAR * rotor["shaft_direction"]).tolist()
         rotor["rotation"] = -rotor["rotation"]
+    for surface in image["body"].get("surfaces", []):
+        surface["position"] = (POLAR * surface["position"]).tolist()
+        surface["dihedral_deg"] = -surface["dihedral_deg"]
+    if "fuselage" in image["body"]:
+        _mirror_fuselage(image["body"]["fuselage"])
     return image
+
+
+def _mirror_fuselage(fuselage):
+    """Wind from the other side: side force, rolling and yawing moment change their sign."""
+    fuselage["reference"] = (POLAR * fuselage["reference"]).tolist()
+    fuselage["beta_deg"] = [-beta for beta in reversed(fuselage["beta_deg"])]
+    for name, sign in (("drag", 1), ("side", -1), ("lift", 1), ("roll", -1), ("pitch", 1), ("yaw", -1)):
+        table = fuselage.get(name, {})
+        if "alpha" in table:
+            table["alpha"] = [sign * value for value in table["alpha"]]
+        if "beta" in table:
+            table["beta"] = [sign * value for value in reversed(table["beta"])]
+        if "grid" in table:
+            table["grid"] = [[sign * value for value in reversed(row)] for row in table["grid"]]
 
 
 def mirrored_state(x):

@@ -194,8 +194,7 @@ def rotor_records(ac, airfoil_names):
         record["sense"] = rotor.rotation
         record["lag_hinge_offset"] = rotor.hinge_offset - rotor.flap_hinge_offset
         record["first_moment"] = rotor.blade_mass * rotor.blade_cg
-        uniform = rotor.blade_mass * (rotor.radius - rotor.hinge_offset) ** 2 / 3
-        record["second_moment"] = uniform if rotor.blade_inertia is None else rotor.blade_inertia
+        record["second_moment"] = rotor.blade_mass * (rotor.radius - rotor.hinge_offset) ** 2 / 3
         record["shaft"] = rotor.shaft_direction
         record["x_hub"], record["y_hub"] = hub_axes(rotor.shaft_direction)
         first += rotor.blades

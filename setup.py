@@ -51,6 +51,7 @@ EXECUTABLES = [
     "validate = sbs_sim.commands.validate:main",  # published results of others beside ours
     "gusts = sbs_sim.commands.gusts:main",  # design the hover hold, and test it in turbulence and gusts
     "plot = sbs_sim.commands.plot:main",  # draw a log over time
+    "aircraft = sbs_sim.commands.aircraft:main",  # write an aircraft as a commented file
 ]
 # colcon puts the executables where `ros2 run` finds them, in lib/sbs_sim. A wheel puts all into the PATH, where names
 # such as `plot` belong to nobody: it brings one command for all of them.

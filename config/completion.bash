@@ -2,7 +2,7 @@
 # Made by tools/make_completion.py: do not edit.
 # shellcheck shell=bash disable=SC2207  # no completion has blanks in it
 
-_sbs_sim_names='simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep batch reproduce validate gusts plot'
+_sbs_sim_names='simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep batch reproduce validate gusts plot aircraft'
 _sbs_sim_own='build test shell python completion --help --version'
 _sbs_sim_aircraft='castles_gray coaxial hammond sbs sbs_paper tandem uh60a_genhel uh60a_tm85890'
 _sbs_sim_conditions='airspeed climb_rate sideslip_deg turn_rate_deg'
@@ -21,14 +21,15 @@ _sbs_sim_options() {
         'validate') echo '--help --version --list --json --page --strict' ;;
         'gusts') echo '--help --version --aircraft --set --wind --turbulence --length --gust --gust-duration --seed --duration --delay --limit --json' ;;
         'plot') echo '--help --version --out --flight' ;;
+        'aircraft') echo '--help --version --aircraft --set --out' ;;
     esac
 }
 
 _sbs_sim_follows() {
     case $1 in
-        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'validate --json' | 'validate --page' | 'gusts --json' | 'plot' | 'plot --out') echo '@files' ;;
-        'replay --set' | 'trim --set' | 'linearize --set' | 'sweep --set' | 'batch --spread' | 'batch --set' | 'gusts --set') echo '@assigned' ;;
-        'trim --aircraft' | 'linearize --aircraft' | 'sweep --aircraft' | 'batch --aircraft' | 'reproduce --aircraft' | 'reproduce --paper-aircraft' | 'gusts --aircraft') echo '@aircraft' ;;
+        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'validate --json' | 'validate --page' | 'gusts --json' | 'plot' | 'plot --out' | 'aircraft --out') echo '@files' ;;
+        'replay --set' | 'trim --set' | 'linearize --set' | 'sweep --set' | 'batch --spread' | 'batch --set' | 'gusts --set' | 'aircraft --set') echo '@assigned' ;;
+        'trim --aircraft' | 'linearize --aircraft' | 'sweep --aircraft' | 'batch --aircraft' | 'reproduce --aircraft' | 'reproduce --paper-aircraft' | 'gusts --aircraft' | 'aircraft --aircraft') echo '@aircraft' ;;
         'trim --method') echo 'newton two_loop' ;;
         'linearize --method') echo 'averaged paper' ;;
         'sweep') echo '@paths' ;;

@@ -98,7 +98,7 @@ def report(table: AirfoilTable) -> None:
     """Print the characteristics of each polar."""
     print("Slope [1/rad] over 0..2 and 0..8 deg, maximum lift, least drag, join with Viterna, least confidence")
     print("       Re    0-2    0-8  cl_max  [deg]   cd_min  join     cl      cd  confidence")
-    for reynolds in table.reynolds:
+    for reynolds in table.numbers:
         alpha, cl, cd = (values[len(values) // 2 :] for values in trusted_polar(reynolds, STEP_DEG))
         slopes = [_slope(alpha, cl, np.radians(limit)) for limit in (2.0, 8.0)]
         best = np.argmax(cl)

@@ -44,6 +44,7 @@ from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, SPEED, StateLayout
 
 MAX_CHANGES_SHOWN = 5  # in a refusal
 TYPICAL_ANGLE = 0.3  # rad; the range of a control that is no angle counts as that in trims
+COEFFICIENTS = ("alpha", "cl", "cd")  # of airfoil tables
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,8 +226,10 @@ class Aircraft(Description):
                 held = math.nan if control.held is None else control.held
                 _digest(digest, f"control {control.name} {control.unit}", held)
         for table in self.tables:
-            for name in ("reynolds", "alpha", "cl", "cd"):
-                _digest(digest, name, getattr(table, name))
+            for name, values in ((table.axis, table.numbers), *((key, getattr(table, key)) for key in COEFFICIENTS)):
+                _digest(digest, name, values)
+        if any(table.axis == "mach" for table in self.tables):
+            _digest(digest, "speed_of_sound", self.environment.speed_of_sound)
         return digest.hexdigest()
 
     def files(self) -> tuple[dict[str, Any], dict[str, bytes]]:
@@ -443,11 +446,11 @@ class Aircraft(Description):
 
     @cached_property
     def stall_table(self) -> Array:
-        """Reynolds numbers and stall angles of every rotor as `working_state` takes them, shape (n_rotors, 3, n)."""
-        size = max(len(table.reynolds) for table in self.tables)
+        """Reynolds or Mach numbers and stall angles of every rotor as `working_state` takes them, shape (n_rotors, 3, n)."""
+        size = max(len(table.numbers) for table in self.tables)
         return np.array(
             [
-                np.pad((table.reynolds, *stall_angles(table)), ((0, 0), (0, size - len(table.reynolds))), "edge")
+                np.pad((table.numbers, *stall_angles(table)), ((0, 0), (0, size - len(table.numbers))), "edge")
                 for table in self.tables
             ]
         )

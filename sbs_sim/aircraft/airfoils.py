@@ -62,6 +62,6 @@ def _covers_circle(path: Path) -> bool:
     try:
         with path.open(encoding="utf-8-sig") as file:
             rows = [line for line in itertools.islice(file, 1000) if line.strip() and not line.lstrip().startswith("#")]
-        return float(rows[1].split(",")[1]) == -180.0  # the first row is the header
+        return float(rows[1].split(",")[rows[0].replace(" ", "").split(",").index("alpha_deg")]) == -180.0
     except (OSError, ValueError, IndexError):  # `read_table` reports the fault
         return False

@@ -69,12 +69,13 @@ class Environment:
     )
     gravity: float = number("Acceleration of gravity", 0, 100, "m/s^2", symbol="g", model_field="gravity")
     speed_of_sound: float = number(
-        "Speed of sound, for the warning of high Mach numbers only; follows from `altitude` where the file has that",
+        "Speed of sound, for airfoil tables over the Mach number and the warning of high Mach numbers; follows from "
+        "`altitude` where the file has that",
         1,
         10000,
         "m/s",
         default=340.3,  # ISO 2533, standard atmosphere, at sea level
-        is_physics=False,
+        is_physics=False,  # counts in the hash of aircraft that have such a table
     )
     altitude: float | None = number(
         "Pressure altitude in the standard atmosphere, instead of density, viscosity and speed of sound",

@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim.aircraft.declaration import model_values
 from sbs_sim.aircraft.description import ENGINES, Body, Drive, Rotor
@@ -30,7 +30,7 @@ def model_of(aircraft: "Aircraft") -> R.Model:
     first_rows = dict(zip(airfoils, np.cumsum([0, *map(len, tables)])[:-1].tolist(), strict=True))
     table = R.aligned((sum(map(len, tables)), tables[0].shape[1]), float)
     table[:] = np.concatenate(tables)
-    most = max(len(airfoil.reynolds) for airfoil in airfoils) - 2
+    most = max(len(airfoil.knots) for airfoil in airfoils) - 2
     blades = R.records(R.BLADE, aircraft.layout.blade_count, 1)
     knots = R.aligned((len(blades), most, 1), float)
     quads = np.cumsum([0, *(-(-rotor.blades // R.QUAD) for rotor in aircraft.rotors)])
@@ -41,7 +41,7 @@ def model_of(aircraft: "Aircraft") -> R.Model:
             _set(blades[number], _blade_values(aircraft, rotor, k, airfoil, first_rows[airfoil]))
             blades[number]["quad"], blades[number]["starts_quad"] = quads[j] + k // R.QUAD, k % R.QUAD == 0
             blades[number]["elements"], blades[number]["harmonics"] = j, harmonic_count(rotor.blades)
-            inner = airfoil.reynolds[1:-1]
+            inner = airfoil.knots[1:-1]
             knots[number, :, 0] = np.concatenate([inner, np.full(most - len(inner), np.inf)])
             number += 1
     return R.Model(
@@ -102,7 +102,7 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
 def _air(aircraft: "Aircraft") -> NDArray[Any]:
     air, environment = R.records(R.AIR, 1, 1), aircraft.environment
     values = {**model_values(environment, R.AIR), **model_values(aircraft.body, R.AIR)}
-    _set(air[0], values | {"inverse_viscosity": 1.0 / environment.kinematic_viscosity})
+    _set(air[0], values)
     return air
 
 
@@ -167,8 +167,8 @@ def _blade_values(
         "inverse_alpha_step": inverse_step,
         "alpha_cells": columns,
         "first_row": first_row,
-        "min_reynolds": airfoil.reynolds[0],
-        "max_reynolds": airfoil.reynolds[-1],
+        "min_number": airfoil.range[0],
+        "max_number": airfoil.range[1],
     }
 
 
@@ -293,6 +293,15 @@ def _elements(aircraft: "Aircraft") -> NDArray[Any]:
     count = aircraft.options.elements
     elements = R.records(R.ELEMENT, (len(aircraft.rotors), count), 1)
     for j, rotor in enumerate(aircraft.rotors):
-        for name, values in zip(R.ELEMENT, rotor.elements(count), strict=True):
+        for name, values in zip(R.ELEMENT, rotor.elements(count), strict=False):
             elements[name][j, :, 0] = values
+        elements["number_scale"][j] = number_scale(aircraft, j, elements["chord"][j])
     return elements
+
+
+def number_scale(aircraft: "Aircraft", rotor: int, chord: ArrayLike) -> Any:
+    """Reynolds or Mach number, whichever the rotor's airfoil table is over, of a section over its airspeed [s/m]."""
+    environment = aircraft.environment
+    if aircraft.tables[rotor].axis == "mach":
+        return 1.0 / environment.speed_of_sound
+    return chord * (1.0 / environment.kinematic_viscosity)

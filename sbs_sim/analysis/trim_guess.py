@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.description import TRIMMED_CONTROLS, Rotor
-from sbs_sim.aircraft.model_records import MIN_DENSITY, second_moment
+from sbs_sim.aircraft.model_records import MIN_DENSITY, number_scale, second_moment
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.content import ByContent
 from sbs_sim.flight.trim_point import TrimCondition
@@ -100,8 +100,8 @@ class MomentumRotor:
         self._density = max(aircraft.environment.air_density, MIN_DENSITY)
         # thrust is this times the induced velocity times the flow through the disc, eq. (6.1)
         self._mass_flow = self._density * self.area / (2 * rotor.duct_expansion**2)
-        reynolds = 0.75 * self.tip_speed * rotor.mean_chord * float(model.air["inverse_viscosity"][0, 0])
-        curve = _lift_curve(aircraft.tables[j], reynolds)
+        number = 0.75 * self.tip_speed * float(number_scale(aircraft, j, rotor.mean_chord))
+        curve = _lift_curve(aircraft.tables[j], number)
         self._sum_sections(rotor, rotor.elements(aircraft.options.elements), *curve)
         self._hold_blades(rotor, second_moment(aircraft, rotor), aircraft.environment.gravity)
         self.wrench = self._make_wrench(rotor.hub)
@@ -418,10 +418,11 @@ def _clipped(value: float, most: float) -> float:
     return min(most, max(-most, value))
 
 
-def _lift_curve(table: AirfoilTable, reynolds: float) -> tuple[float, float, float]:
+def _lift_curve(table: AirfoilTable, number: float) -> tuple[float, float, float]:
     """Slope of lift [1/rad] and lift at zero angle of attack, and drag where the slope ends."""
-    row = min(int(np.searchsorted(table.reynolds, reynolds)), len(table.reynolds) - 1)
-    zero = len(table.alpha) // 2
-    count = max(1, round(LIFT_ANGLE / float(table.alpha[zero + 1])))
-    low, high = float(table.cl[row, zero]), float(table.cl[row, zero + count])
-    return max((high - low) / float(table.alpha[zero + count]), MIN_SLOPE), low, float(table.cd[row, zero + count])
+    row = min(int(np.searchsorted(table.numbers, number)), len(table.numbers) - 1)
+    zero = int(np.argmin(np.abs(table.alpha)))
+    end = max(zero + 1, int(np.argmin(np.abs(table.alpha - LIFT_ANGLE))))
+    low, high, start = float(table.cl[row, zero]), float(table.cl[row, end]), float(table.alpha[zero])
+    slope = max((high - low) / (float(table.alpha[end]) - start), MIN_SLOPE)
+    return slope, low - slope * start, float(table.cd[row, end])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.description import Rotor
 from sbs_sim.model import working_state as W
+from sbs_sim.model.airfoil import NUMBER_NAMES
 
 Array = NDArray[np.float64]
 
@@ -17,11 +18,11 @@ Array = NDArray[np.float64]
 MAX_ADVANCE_RATIO = 0.4
 MAX_STALLED = 0.1  # of the disc; the sections know nothing of dynamic stall
 MAX_REVERSED = 0.1  # of the disc; reached at an advance ratio of 0.63, where the circle of reverse flow has mu^2 / 4
-# Airfoil tables have no Mach number. By the rule of Prandtl and Glauert (J. D. Anderson: Fundamentals of aerodynamics,
+# Of airfoil tables over the Reynolds number, which have no Mach number. By the rule of Prandtl and Glauert (J. D. Anderson: Fundamentals of aerodynamics,
 # section 11.4) a section lifts 1 / sqrt(1 - M^2) of what it does in incompressible flow: 11 % more at this one.
 MAX_TIP_MACH = 0.44
 INCOMPRESSIBLE = "where incompressible section data do not hold"
-MAX_OUTSIDE = 0.1  # of the disc, with Reynolds numbers that the airfoil's table does not have
+MAX_OUTSIDE = 0.1  # of the disc, with Reynolds or Mach numbers that the airfoil's table does not have
 # Momentum theory in descent, in hover inflow velocities: the vortex ring state begins and ends where the motion of a
 # helicopter in it becomes unstable, W. Johnson: Model for vortex ring state influence on rotorcraft flight dynamics,
 # NASA/TP-2005-213477; up to twice the hover inflow there is no stream tube, J. G. Leishman: Principles of helicopter
@@ -54,7 +55,7 @@ class WorkingState:
         thrust; negative in a climb, zero if the rotor is unloaded.
     stalled_share, reversed_share, outside_share : float
         Of the disc between flap hinge and tip: where sections are stalled, where the flow comes from behind, and where
-        the Reynolds number is not in the airfoil's table; as the blades meet it at this instant.
+        the Reynolds or Mach number is not in the airfoil's table; as the blades meet it at this instant.
     inflow_state : str
         One of `INFLOW_STATES`.
     """
@@ -140,7 +141,7 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
         Of `sbs_sim.model.working_state`.
     """
     found = []
-    for rotor, row in zip(aircraft.rotors, rows, strict=True):
+    for rotor, table, row in zip(aircraft.rotors, aircraft.tables, rows, strict=True):
         state = working_state(row)
         if state.inflow_state in (VORTEX_RING, TURBULENT_WAKE):
             found.append(f"{rotor.name}: {state.inflow_state} state, where momentum theory does not hold")
@@ -150,12 +151,12 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
             found.append(f"{rotor.name}: stall on more than {MAX_STALLED:.0%} of the disc, without its dynamics")
         if state.reversed_share > MAX_REVERSED:
             found.append(f"{rotor.name}: reverse flow on more than {MAX_REVERSED:.0%} of the disc")
-        if tip_mach(aircraft, rotor, row) > MAX_TIP_MACH:
+        if table.axis != "mach" and tip_mach(aircraft, rotor, row) > MAX_TIP_MACH:
             found.append(f"{rotor.name}: tip Mach number above {MAX_TIP_MACH:g}, {INCOMPRESSIBLE}")
         if state.outside_share > MAX_OUTSIDE:
-            low, *_, high = aircraft.airfoils[rotor.airfoil].reynolds
-            table = f"{low:g} to {high:g}, those of the airfoil table,"
-            found.append(f"{rotor.name}: Reynolds number outside {table} on more than {MAX_OUTSIDE:.0%} of the disc")
+            low, high = table.range
+            known = f"{NUMBER_NAMES[table.axis]} outside {low:g} to {high:g}, those of the airfoil table,"
+            found.append(f"{rotor.name}: {known} on more than {MAX_OUTSIDE:.0%} of the disc")
     return found
 
 
@@ -175,12 +176,13 @@ def _is_quiet(aircraft: Aircraft, working: Array) -> NDArray[np.bool_]:
     """Instants of which `warnings` surely says nothing, shape (n,); most are, and words take long."""
     sound = aircraft.environment.speed_of_sound
     tips = np.array([rotor.speed * rotor.radius for rotor in aircraft.rotors])
+    limits = np.array([math.inf if table.axis == "mach" else MAX_TIP_MACH for table in aircraft.tables])
     quiet = (
         (working[..., W.ADVANCE_RATIO] <= MAX_ADVANCE_RATIO)
         & (working[..., W.STALLED] <= MAX_STALLED)
         & (working[..., W.REVERSED] <= MAX_REVERSED)
         & (working[..., W.OUTSIDE] <= MAX_OUTSIDE)
-        & (tips * (1.0 + working[..., W.ADVANCE_RATIO]) / sound <= MAX_TIP_MACH)
+        & (tips * (1.0 + working[..., W.ADVANCE_RATIO]) / sound <= limits)
         # no vortex ring before its slowest descent, and nothing beyond it
         & (working[..., W.DESCENT] < RING_DESCENT[0] * (1.0 - MARGIN) * working[..., W.HOVER_INFLOW])
     )

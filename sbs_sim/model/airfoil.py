@@ -1,6 +1,6 @@
-"""Section lift and drag over Reynolds number and angle of attack (theory.md section 4).
+"""Section lift and drag over Reynolds or Mach number and angle of attack (theory.md section 4).
 
-A table holds cl and cd on a full grid of Reynolds numbers and angles from -180 to 180 deg. Compiled code
+A table holds cl and cd on a full grid of Reynolds or Mach numbers and angles from -180 to 180 deg. Compiled code
 reads it as an array of cells, two cache lines per cell with the coefficients of the interpolation, laid out over three
 turns of the angle so that nothing has to be wrapped.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations  # `help` then shows types by their names
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -21,14 +22,18 @@ from sbs_sim.model.elementary import cosine_and_sine
 
 Array = NDArray[np.float64]
 
-COLUMNS = ("reynolds", "alpha_deg", "cl", "cd")
-HEADER = ",".join(COLUMNS)
+POLAR_COLUMNS = ("alpha_deg", "cl", "cd")
+AXES = ("reynolds", "mach")  # what a table may be over, besides the angle
+COLUMNS = (*((axis, *POLAR_COLUMNS) for axis in AXES), POLAR_COLUMNS)
+HEADERS = " or ".join(",".join(columns) for columns in COLUMNS)
 PLATE_DRAG, PLATE_DRAG_SLOPE = 1.11, 0.018  # of a blade broadside on: at no aspect ratio, and by aspect ratio
 INFINITE_BLADE = 50.0  # aspect ratio from which it is that of an infinite plate, 2.01
 REFLECTED_LIFT = -0.7  # cl of the reversed airfoil over cl of the airfoil at the mirrored angle
 TURNS = 3  # turns of the angle that the cells cover: -540..540 deg
 MIN_STEP_DEG, MAX_STEP_DEG = 0.01, 10.0
+MAX_FAR_STEP_DEG, FAR_DEG = 45.0, 30.0  # between angles of which one is beyond FAR_DEG
 STEP_TOLERANCE = 0.01  # of a step, for angles that were rounded in the file
+FINEST_DEG, ROUNDING_DEG = 0.05, 0.001  # of the common step of uneven angles
 ATTACHED = math.radians(5.0)  # from the angle of no lift: so far the flow is taken to be attached
 SEPARATED = 0.5  # of the lift of attached flow: below, the flow has left the section
 
@@ -40,22 +45,67 @@ class AirfoilTable(ByContent):
     Attributes
     ----------
     name : str
-    reynolds : ndarray, shape (n_re,)
-        Reynolds numbers, increasing, at least two.
+    numbers : ndarray, shape (n,)
+        Reynolds or Mach numbers, increasing; a table with one number holds for all.
     alpha : ndarray, shape (n_alpha,)
-        Angles of attack [rad] from -pi to pi with one step.
-    cl, cd : ndarray, shape (n_re, n_alpha)
+        Angles of attack [rad] from -pi to pi, multiples of one step that divides pi.
+    cl, cd : ndarray, shape (n, n_alpha)
         Lift and drag coefficient; the values at -pi and pi are equal.
     given : (float, float)
         Lowest and highest angle that was not made by `extend_polar` [rad].
+    axis : str
+        One of `AXES`: what `numbers` are.
     """
 
     name: str
-    reynolds: Array
+    numbers: Array
     alpha: Array
     cl: Array
     cd: Array
     given: tuple[float, float] = (-math.pi, math.pi)
+    axis: str = "reynolds"
+
+    @cached_property
+    def half(self) -> int:
+        """Steps in 180 deg of the coarsest even grid that has all angles."""
+        return half_turn(self.alpha)
+
+    @property
+    def intervals(self) -> Array:
+        """Steps between an angle and the next."""
+        return np.rint(np.diff(self.alpha) / (np.pi / self.half))
+
+    @property
+    def knots(self) -> Array:
+        """Numbers between which the compiled model interpolates, at least two."""
+        return self.numbers if len(self.numbers) > 1 else np.array([0.0, 1.0])
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Least and largest number for which the table holds."""
+        return (float(self.numbers[0]), float(self.numbers[-1])) if len(self.numbers) > 1 else (0.0, math.inf)
+
+
+def half_turn(alpha: Array) -> int:
+    """Steps in 180 deg of the coarsest even grid that has all angles [rad]; 0 if its step were below `FINEST_DEG`.
+
+    Even angles that were rounded may be off by a hundredth of their step, uneven ones by a thousandth of a degree.
+    """
+    angles = np.degrees(alpha)
+    step = (angles[-1] - angles[0]) / (len(angles) - 1)
+    half = max(1, round(float(180 / step)))
+    if np.all(np.abs(np.diff(angles) - step) <= STEP_TOLERANCE * step) and _are_multiples(angles, half, STEP_TOLERANCE):
+        return half
+    for half in range(1, round(180 / FINEST_DEG) + 1):
+        if _are_multiples(angles, half, ROUNDING_DEG / 180 * half):
+            return half
+    return 0
+
+
+def _are_multiples(angles: Array, half: int, tolerance: float) -> bool:
+    """True if all angles [deg] are multiples of 180 deg / half within a tolerance in steps, and no two are the same."""
+    steps = angles / 180 * half
+    return bool(np.all(np.abs(steps - np.rint(steps)) <= tolerance) and np.all(np.diff(np.rint(steps)) > 0))
 
 
 def stall_angles(table: AirfoilTable) -> tuple[Array, Array]:
@@ -72,8 +122,8 @@ def stall_angles(table: AirfoilTable) -> tuple[Array, Array]:
 
     Returns
     -------
-    highest, lowest : ndarray, shape (n_re,)
-        For each Reynolds number of the table [rad]. Of several angles of equal lift the one nearest to zero.
+    highest, lowest : ndarray, shape (n,)
+        For each Reynolds or Mach number of the table [rad]. Of several angles of equal lift the one nearest to zero.
 
     References
     ----------
@@ -83,18 +133,19 @@ def stall_angles(table: AirfoilTable) -> tuple[Array, Array]:
     """
     lowest, highest = table.given
     above = [_max_lift_angle(table.alpha, cl) for cl in table.cl]
-    below = [_max_lift_angle(table.alpha, -cl[::-1]) for cl in table.cl]
+    below = [_max_lift_angle(0.0 - table.alpha[::-1], -cl[::-1]) for cl in table.cl]
     return np.minimum(above, highest), -np.minimum(below, -lowest)
 
 
 def _max_lift_angle(alpha: Array, cl: Array) -> float:
     """Angle of maximum lift of attached flow, upwards from 0 [rad]; pi where there is no lift."""
-    attached = max(ATTACHED, 1.5 * (alpha[1] - alpha[0]))
+    middle = int(np.argmin(np.abs(alpha)))
+    attached = max(ATTACHED, 1.5 * (alpha[middle + 1] - alpha[middle]), 1.5 * (alpha[middle] - alpha[middle - 1]))
     near = np.abs(alpha) < attached
     slope, at_zero = np.polyfit(alpha[near], cl[near], 1)
     if slope <= 0.0:
         return math.pi
-    angles, lift = alpha[len(alpha) // 2 :], cl[len(alpha) // 2 :]
+    angles, lift = alpha[middle:], cl[middle:]
     linear = at_zero + slope * angles
     is_attached = (linear < slope * attached) | (lift >= SEPARATED * linear)
     end = int(np.argmin(np.append(is_attached, False)))
@@ -157,7 +208,7 @@ def extend_polar(alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: f
     ----------
     alpha : array_like, shape (n,)
         Angles of attack [rad], multiples of one step that divides pi, from -pi/2..0 to 0..pi/2 (ends
-        excluded).
+        excluded); they need not be even.
     cl, cd : array_like, shape (n,)
         Lift and drag coefficient.
     aspect_ratio : float
@@ -165,15 +216,15 @@ def extend_polar(alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: f
 
     Returns
     -------
-    alpha, cl, cd : ndarray, shape (2 pi / step + 1,)
-        From -pi to pi with the same step; cl and cd are equal at both ends.
+    alpha, cl, cd : ndarray, shape (n_alpha,)
+        From -pi to pi, beyond the given angles with the common step of these; cl and cd are equal at both ends.
     """
     alpha, cl, cd = (np.asarray(values, dtype=np.float64) for values in (alpha, cl, cd))
-    step = (alpha[-1] - alpha[0]) / (len(alpha) - 1)
-    half = round(np.pi / step)
+    half = half_turn(alpha)
     circle = np.arange(-half, half + 1) * (np.pi / half)
-    first = half + round(alpha[0] / step)
-    last = first + len(alpha) - 1
+    kept = half + np.rint(alpha / np.pi * half).astype(np.int64)
+    circle = np.concatenate([circle[: kept[0]], circle[kept], circle[kept[-1] + 1 :]])
+    first, last = kept[0], kept[0] + len(alpha) - 1
     low, high = -circle[first], circle[last]
     below = viterna(circle[:first], low, -cl[0], cd[0], aspect_ratio)
     above = viterna(circle[last + 1 :], high, cl[-1], cd[-1], aspect_ratio)
@@ -189,10 +240,11 @@ def extend_polar(alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: f
 def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
     """Read an airfoil table from a CSV file.
 
-    The file has the header `reynolds,alpha_deg,cl,cd` and a full grid: one block of rows for each Reynolds
-    number, in increasing order, each with the same angles in one step. Lines that begin with '#' are
-    comments. The angles run from -180 to 180 deg, or over an attached range around zero that `extend_polar`
-    completes.
+    The file has the header `reynolds,alpha_deg,cl,cd` or `mach,alpha_deg,cl,cd` and a full grid: one block of rows for
+    each Reynolds or Mach number, in increasing order, each with the same angles; or the header `alpha_deg,cl,cd` and
+    one block, for all numbers. Lines that begin with '#' are comments. The angles run from -180 to 180 deg, or over an
+    attached range around zero that `extend_polar` completes. They are multiples of one step, 0.05 deg or more if they
+    are uneven.
 
     Parameters
     ----------
@@ -211,24 +263,25 @@ def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
         With one line: file, line, column, the value and what is allowed.
     """
     path = Path(path)
-    values, lines = _read_rows(path)
-    blocks = _split_blocks(path, values, lines)
-    half = _check_angles(path, values, lines, blocks)
-    reynolds = values[[block.start for block in blocks], 0]
+    columns, values, lines = _read_rows(path)
+    axis = columns[0] if columns[0] in AXES else AXES[0]
+    blocks = _split_blocks(path, axis, values, lines)
+    half = _check_angles(path, axis, values, lines, blocks)
+    numbers = values[[block.start for block in blocks], 0]
     step = np.pi / half
     alpha = np.rint(values[blocks[0], 1] / math.degrees(step)) * step
     cl = np.array([values[block, 2] for block in blocks])
     cd = np.array([values[block, 3] for block in blocks])
-    if len(alpha) == 2 * half + 1:
+    if values[0, 1] == -180:
         _check_ends(path, lines, blocks, cl, cd)
-        return AirfoilTable(path.stem, reynolds, alpha, cl, cd)
+        return AirfoilTable(path.stem, numbers, alpha, cl, cd, axis=axis)
     extended = [extend_polar(alpha, *polar, aspect_ratio) for polar in zip(cl, cd, strict=True)]
     circle, circle_cl, circle_cd = (np.array(rows) for rows in zip(*extended, strict=True))
-    return AirfoilTable(path.stem, reynolds, circle[0], circle_cl, circle_cd, (float(alpha[0]), float(alpha[-1])))
+    return AirfoilTable(path.stem, numbers, circle[0], circle_cl, circle_cd, (float(alpha[0]), float(alpha[-1])), axis)
 
 
-def _read_rows(path: Path) -> tuple[Array, list[int]]:
-    """All rows as numbers, shape (n, 4), and the line number of each."""
+def _read_rows(path: Path) -> tuple[tuple[str, ...], Array, list[int]]:
+    """Columns of the file, all rows as numbers, shape (n, 4), and the line number of each."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -238,26 +291,32 @@ def _read_rows(path: Path) -> tuple[Array, list[int]]:
     content = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1)]
     content = [(i, line) for i, line in content if line and not line.startswith("#")]
     if not content:
-        raise AirfoilError(f"{path}: holds no table, must begin with the header {HEADER}")
+        raise AirfoilError(f"{path}: holds no table, must begin with the header {HEADERS}")
     number, header = content[0]
-    if header.replace(" ", "") != HEADER:
-        raise AirfoilError(f"{path}:{number}: header {header[:60]!r} must be {HEADER}")
-    rows = [_parse_row(path, i, line) for i, line in content[1:]]
+    columns = tuple(header.replace(" ", "").split(","))
+    if columns not in COLUMNS:
+        both = "; a table over both Reynolds and Mach number is not read" if set(AXES) <= set(columns) else ""
+        raise AirfoilError(f"{path}:{number}: header {header[:60]!r} must be {HEADERS}{both}")
+    rows = [_parse_row(path, i, line, columns) for i, line in content[1:]]
     if not rows:
         raise AirfoilError(f"{path}:{number}: no rows follow the header")
-    return np.array(rows), [i for i, _ in content[1:]]
+    return columns, np.array(rows), [i for i, _ in content[1:]]
 
 
-def _parse_row(path: Path, line: int, text: str) -> list[float]:
+def _parse_row(path: Path, line: int, text: str, columns: tuple[str, ...]) -> list[float]:
+    """Number of the axis, 0 where the file has none, angle, cl and cd."""
     fields = text.split(",")
-    if len(fields) != len(COLUMNS):
-        raise AirfoilError(f"{path}:{line}: {len(fields)} values, must be {len(COLUMNS)}: {HEADER}")
-    row = [_parse_number(path, line, *item) for item in zip(COLUMNS, fields, strict=True)]
-    for column in ("reynolds", "cd"):
-        value = row[COLUMNS.index(column)]
-        if value <= 0:
-            raise _bad(path, line, column, value, "greater than 0")
-    return row
+    if len(fields) != len(columns):
+        raise AirfoilError(f"{path}:{line}: {len(fields)} values, must be {len(columns)}: {','.join(columns)}")
+    row = {"reynolds": 0.0, "mach": 0.0}
+    row |= {column: _parse_number(path, line, column, field) for column, field in zip(columns, fields, strict=True)}
+    for column in set(columns) & {"reynolds", "cd"}:
+        if row[column] <= 0:
+            raise _bad(path, line, column, row[column], "greater than 0")
+    if row["mach"] < 0:
+        raise _bad(path, line, "mach", row["mach"], "0 or greater")
+    axis = columns[0] if columns[0] in AXES else AXES[0]
+    return [row[column] for column in (axis, *POLAR_COLUMNS)]
 
 
 def _parse_number(path: Path, line: int, column: str, field: str) -> float:
@@ -274,54 +333,54 @@ def _bad(path: Path, line: int, column: str, value: float, allowed: str) -> Airf
     return AirfoilError(f"{path}:{line}: {column} {value:.10g} must be {allowed}")
 
 
-def _split_blocks(path: Path, values: Array, lines: list[int]) -> list[slice]:
-    """Rows of each Reynolds number; every block must repeat the angles of the first."""
-    reynolds = values[:, 0]
-    for row in np.flatnonzero(np.diff(reynolds) < 0) + 1:
-        allowed = f"at least {reynolds[row - 1]:.10g}, the one above"
-        raise _bad(path, lines[row], "reynolds", reynolds[row], allowed)
-    starts = [0, *(np.flatnonzero(np.diff(reynolds)) + 1)]
+NUMBER_NAMES = {"reynolds": "Reynolds number", "mach": "Mach number"}
+
+
+def _split_blocks(path: Path, axis: str, values: Array, lines: list[int]) -> list[slice]:
+    """Rows of each Reynolds or Mach number; every block must repeat the angles of the first."""
+    numbers = values[:, 0]
+    for row in np.flatnonzero(np.diff(numbers) < 0) + 1:
+        allowed = f"at least {numbers[row - 1]:.10g}, the one above"
+        raise _bad(path, lines[row], axis, numbers[row], allowed)
+    starts = [0, *(np.flatnonzero(np.diff(numbers)) + 1)]
     blocks = [slice(*ends) for ends in zip(starts, [*starts[1:], len(values)], strict=True)]
-    if len(blocks) < 2:
-        raise _bad(path, lines[0], "reynolds", reynolds[0], "one of at least 2 different values in the table")
     for block in blocks[1:]:
-        _check_same_angles(path, values[blocks[0], 1], values[block, 1], lines[block])
+        _check_same_angles(path, NUMBER_NAMES[axis], values[blocks[0], 1], values[block, 1], lines[block])
     return blocks
 
 
-def _check_same_angles(path: Path, first: Array, angles: Array, lines: list[int]) -> None:
+def _check_same_angles(path: Path, number: str, first: Array, angles: Array, lines: list[int]) -> None:
     for expected, angle, line in zip(first, angles, lines, strict=False):
         if angle != expected:
-            raise _bad(path, line, "alpha_deg", angle, f"{expected:.10g} as for the first Reynolds number")
+            raise _bad(path, line, "alpha_deg", angle, f"{expected:.10g} as for the first {number}")
     if len(angles) != len(first):
-        allowed = f"the last of {len(first)} angles as for the first Reynolds number, not of {len(angles)}"
+        allowed = f"the last of {len(first)} angles as for the first {number}, not of {len(angles)}"
         raise _bad(path, lines[-1], "alpha_deg", angles[-1], allowed)
 
 
-def _check_angles(path: Path, values: Array, lines: list[int], blocks: list[slice]) -> int:
+def _check_angles(path: Path, axis: str, values: Array, lines: list[int], blocks: list[slice]) -> int:
     """Check the angles of the first block and return the number of steps in 180 deg."""
     angles = values[blocks[0], 1]
     if len(angles) < 3:
-        raise _bad(path, lines[0], "alpha_deg", angles[0], "one of at least 3 angles per Reynolds number")
-    _check_step(path, angles, lines)
+        raise _bad(path, lines[0], "alpha_deg", angles[0], f"one of at least 3 angles per {NUMBER_NAMES[axis]}")
+    _check_steps(path, angles, lines)
     _check_span(path, angles, lines)
-    step = (angles[-1] - angles[0]) / (len(angles) - 1)
-    half = round(float(180 / step))
-    steps = angles / 180 * half
-    for i in np.flatnonzero(np.abs(steps - np.rint(steps)) > STEP_TOLERANCE):
-        allowed = f"a multiple of a step that divides 180, not of {step:.10g}"
-        raise _bad(path, lines[i], "alpha_deg", angles[i], allowed)
-    return half
+    if half := half_turn(np.radians(angles)):
+        return half
+    found = [half_turn(np.radians(angles[:i])) for i in range(2, len(angles) + 1)]
+    i = found.index(0) + 1  # the first that does not fit to those above
+    allowed = f"a multiple of a step that divides 180, that all angles have, and that is {FINEST_DEG:g} or more"
+    raise _bad(path, lines[i], "alpha_deg", angles[i], allowed)
 
 
-def _check_step(path: Path, angles: Array, lines: list[int]) -> None:
-    step = angles[1] - angles[0]
-    if not MIN_STEP_DEG <= step <= MAX_STEP_DEG:
-        allowed = f"{MIN_STEP_DEG:g} to {MAX_STEP_DEG:g} above {angles[0]:.10g}"
-        raise _bad(path, lines[1], "alpha_deg", angles[1], allowed)
-    for i in np.flatnonzero(np.abs(np.diff(angles) - step) > STEP_TOLERANCE * step) + 1:
-        allowed = f"{angles[i - 1] + step:.10g}, one step of {step:.10g} after the angle above"
-        raise _bad(path, lines[i], "alpha_deg", angles[i], allowed)
+def _check_steps(path: Path, angles: Array, lines: list[int]) -> None:
+    """Angles increase, in steps that are not too wide for the curves."""
+    for i in range(1, len(angles)):
+        before, angle = angles[i - 1], angles[i]
+        widest = MAX_FAR_STEP_DEG if max(abs(before), abs(angle)) > FAR_DEG else MAX_STEP_DEG
+        if not MIN_STEP_DEG * (1 - STEP_TOLERANCE) <= angle - before <= widest * (1 + STEP_TOLERANCE):
+            allowed = f"{MIN_STEP_DEG:g} to {widest:g} above {before:.10g}"
+            raise _bad(path, lines[i], "alpha_deg", angle, allowed)
 
 
 def _check_span(path: Path, angles: Array, lines: list[int]) -> None:
@@ -354,14 +413,13 @@ def write_table(path: str | Path, table: AirfoilTable, comments: Sequence[str] =
     comments : sequence of str
         Lines on the table's origin, written on top behind '# '.
     """
-    half = round(np.pi / (table.alpha[1] - table.alpha[0]))
-    angles = np.rint(table.alpha / np.pi * half) * 180 / half
-    lines = [f"# {comment}".rstrip() for comment in comments] + [HEADER]
-    for i, reynolds in enumerate(table.reynolds):
+    angles = np.rint(table.alpha / np.pi * table.half) * 180 / table.half
+    lines = [f"# {comment}".rstrip() for comment in comments] + [",".join((table.axis, *POLAR_COLUMNS))]
+    for i, number in enumerate(table.numbers):
         for j, angle in enumerate(angles):
             # Adding zero turns a rounded -0 into 0.
             cl, cd = round(table.cl[i, j], 6) + 0.0, round(table.cd[i, j], 6)
-            lines.append(f"{reynolds:.10g},{angle:.10g},{cl:.6f},{cd:.6f}")
+            lines.append(f"{number:.10g},{angle:.10g},{cl:.6f},{cd:.6f}")
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -373,10 +431,11 @@ def cells(table: AirfoilTable, interpolation: str) -> Array:
     """Coefficients of the interpolation in every cell of a table, for `sbs_sim.model.section`.
 
     Along the angle "smooth" is the monotone cubic of Fritsch and Carlson: its slope is continuous, and it rises or
-    falls wherever the data do; "linear" joins the points by lines. Between Reynolds numbers both are linear.
+    falls wherever the data do; "linear" joins the points by lines. Between Reynolds or Mach numbers both are linear.
 
-    Within a cell, with x in 0..1 the fraction along the angle, cl = sum_k (c_k0 + c_k1 Re) x^k and
-    cd = sum_k (c_k2 + c_k3 Re) x^k, k = 0 to 3.
+    Within a cell, with x in 0..1 the fraction along the angle and z the Reynolds or Mach number,
+    cl = sum_k (c_k0 + c_k1 z) x^k and cd = sum_k (c_k2 + c_k3 z) x^k, k = 0 to 3. Between angles that are several steps
+    apart the polynomial is cut into cells of one step, which changes no value.
 
     Parameters
     ----------
@@ -386,7 +445,7 @@ def cells(table: AirfoilTable, interpolation: str) -> Array:
 
     Returns
     -------
-    ndarray, shape ((n_re - 1) * cell_grid(table)[0], 16)
+    ndarray, shape ((len(table.knots) - 1) * cell_grid(table)[0], 16)
         c_00, c_01, c_02, c_03, c_10 ... of each cell. The angle runs fastest and covers -540..540 deg, so that a
         section angle minus an arctangent, -3 pi..3 pi, needs no wrapping.
 
@@ -394,23 +453,25 @@ def cells(table: AirfoilTable, interpolation: str) -> Array:
     ----------
     F. N. Fritsch, R. E. Carlson: Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17 (2), 1980.
     """
-    lower, width = table.reynolds[:-1, None], np.diff(table.reynolds)[:, None]
+    lower, width, steps = table.knots[:-1, None], np.diff(table.knots)[:, None], table.intervals
     parts = []
     for values in (table.cl, table.cd):
-        powers = _polynomials(values, interpolation)  # (4, n_re, n_alpha - 1)
+        powers = _polynomials(np.repeat(values, 2, axis=0) if len(values) == 1 else values, steps, interpolation)
+        if steps.max() > 1.0:
+            powers = _cut(powers, steps.astype(np.int64))
         slope = np.diff(powers, axis=1) / width
         parts += [powers[:, :-1] - lower * slope, slope]
     rows = np.stack(parts, axis=-1).transpose(1, 2, 0, 3)
     return np.ascontiguousarray(np.tile(rows, (1, TURNS, 1, 1)).reshape(-1, 4 * (DEGREE + 1)))
 
 
-def _polynomials(values: Array, interpolation: str) -> Array:
-    """Coefficients of x^0 to x^3 in every interval of the angle, shape (4, n_re, n_alpha - 1)."""
+def _polynomials(values: Array, steps: Array, interpolation: str) -> Array:
+    """Coefficients of x^0 to x^3 in every interval of the angle of some steps, shape (4, n, n_alpha - 1)."""
     start, rise = values[:, :-1], np.diff(values, axis=1)
     if interpolation == "linear":
         return np.stack([start, rise, np.zeros_like(rise), np.zeros_like(rise)])
-    left = _monotone_slopes(rise)
-    right = np.roll(left, -1, axis=1)
+    slopes = _monotone_slopes(rise / steps, steps)
+    left, right = slopes * steps, np.roll(slopes, -1, axis=1) * steps
     return np.stack([start, left, 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise])
 
 
@@ -427,18 +488,31 @@ def periodic_cubics(values: Array) -> Array:
     ndarray, shape (4, rows, points - 1)
         x is the fraction of a step.
     """
-    return _polynomials(values, "smooth")
+    return _polynomials(values, np.ones(values.shape[1] - 1), "smooth")
 
 
-def _monotone_slopes(rise: Array) -> Array:
-    """Slopes at the beginning of every interval, per interval; the intervals go round the circle.
+def _cut(powers: Array, steps: NDArray[np.int64]) -> Array:
+    """Polynomials of intervals of some steps cut into those of single steps: p((k + x) / m), k = 0 to m - 1."""
+    first = np.concatenate([[0], np.cumsum(steps)[:-1]])
+    k = (np.arange(steps.sum()) - np.repeat(first, steps)).astype(np.float64)
+    whole = np.repeat(powers / np.stack([steps.astype(float) ** i for i in range(DEGREE + 1)])[:, None], steps, axis=-1)
+    return np.stack(
+        [
+            sum((math.comb(i, j) * whole[i] * k ** (i - j) for i in range(j, DEGREE + 1)), np.zeros_like(whole[0]))
+            for j in range(DEGREE + 1)
+        ]
+    )
 
-    The mean of the rises on both sides, not more than three times the smaller: section 4 of Fritsch and Carlson. Zero
-    at a maximum or minimum.
+
+def _monotone_slopes(rise: Array, steps: Array) -> Array:
+    """Slopes at the beginning of every interval, per step; the intervals go round the circle.
+
+    That of the parabola through three points, the mean of the rises per step on both sides where the steps are even,
+    and not more than three times the smaller: section 4 of Fritsch and Carlson. Zero at a maximum or minimum.
     """
-    before = np.roll(rise, 1, axis=1)
+    before, steps_before = np.roll(rise, 1, axis=1), np.roll(steps, 1)
     limit = 3.0 * np.minimum(np.abs(before), np.abs(rise))
-    mean = 0.5 * (before + rise)
+    mean = (steps * before + steps_before * rise) / (steps_before + steps)
     limited = np.where(np.abs(mean) > limit, np.copysign(limit, mean), mean)
     return np.where(before * rise > 0.0, limited, 0.0)
 
@@ -449,28 +523,28 @@ def cell_grid(table: AirfoilTable) -> tuple[int, float, float]:
     Returns
     -------
     n_alpha : int
-        Cells along the angle for each Reynolds cell.
+        Cells along the angle between two Reynolds or Mach numbers.
     alpha0 : float
         First angle [rad].
     inverse_step : float
         Cells per radian.
     """
-    per_turn = len(table.alpha) - 1
+    per_turn = 2 * table.half
     return TURNS * per_turn, -TURNS * np.pi, per_turn / (2 * np.pi)
 
 
 def interpolate(
-    table: AirfoilTable, reynolds: ArrayLike, alpha: ArrayLike, interpolation: str = "smooth"
+    table: AirfoilTable, number: ArrayLike, alpha: ArrayLike, interpolation: str = "smooth"
 ) -> tuple[Array, Array]:
-    """Lift and drag coefficients at arrays of Reynolds numbers and angles, for plots and checks.
+    """Lift and drag coefficients at arrays of Reynolds or Mach numbers and angles, for plots and checks.
 
     Parameters
     ----------
     table : AirfoilTable
-    reynolds : array_like
-        Clamped to the table's range.
+    number : array_like
+        Reynolds or Mach number, whichever the table is over; clamped to the table's range.
     alpha : array_like
-        Angles of attack [rad] of any turn; broadcast against `reynolds`.
+        Angles of attack [rad] of any turn; broadcast against `number`.
     interpolation : str
         See `cells`.
 
@@ -479,11 +553,11 @@ def interpolate(
     cl, cd : ndarray
         The broadcast shape.
     """
-    knots, step = table.reynolds, table.alpha[1] - table.alpha[0]
-    clamped = np.clip(reynolds, knots[0], knots[-1])
+    knots, step = table.knots, np.pi / table.half
+    clamped = np.clip(number, knots[0], knots[-1])
     i = np.clip(np.searchsorted(knots, clamped, side="right") - 1, 0, len(knots) - 2)
     position = np.mod(np.asarray(alpha, dtype=np.float64) + np.pi, 2 * np.pi) / step
-    j = np.clip(position.astype(np.int64), 0, len(table.alpha) - 2)
+    j = np.clip(position.astype(np.int64), 0, 2 * table.half - 1)
     rows = cells(table, interpolation).reshape(len(knots) - 1, -1, DEGREE + 1, 4)[i, j]
     powers = (position - j)[..., None] ** np.arange(DEGREE + 1)
     lift, lift_slope, drag, drag_slope = np.moveaxis(np.einsum("...k,...kc->...c", powers, rows), -1, 0)

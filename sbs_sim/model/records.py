@@ -20,7 +20,7 @@ LANES, VECTOR, MATRIX, INTEGER = (), (3,), (3, 3), None
 LINE = 64  # bytes of a cache line
 QUAD = 4  # blades that are summed first, see `sbs_sim.lanes.memory`
 
-AIR = {"density": LANES, "inverse_viscosity": LANES, "gravity": LANES, "plate_areas": VECTOR}
+AIR = {"density": LANES, "gravity": LANES, "plate_areas": VECTOR}
 # the rigid part, about the c.g.: the fuselage without blades (`complete` coupling), or all of the aircraft (`paper`)
 BODY = {
     "mass": LANES,
@@ -104,8 +104,8 @@ BLADE = {
     "inverse_alpha_step": LANES,
     "alpha_cells": LANES,  # cells of the table along the angle
     "first_row": LANES,
-    "min_reynolds": LANES,
-    "max_reynolds": LANES,
+    "min_number": LANES,
+    "max_number": LANES,
     "quad": INTEGER,
     "starts_quad": INTEGER,  # 1 for the first of a quad, 0 for those that follow it
     "elements": INTEGER,
@@ -144,6 +144,7 @@ ELEMENT = {
     "half_area": LANES,  # c ds / 2 [m^2]
     "lift_factor": LANES,
     "twist": LANES,
+    "number_scale": LANES,  # of the airfoil table over the airspeed: c / nu of Reynolds numbers, 1 / a of Mach numbers
 }
 # parts with tables in `shapes`: see `sbs_sim.model.surfaces`
 SURFACE = {
@@ -215,7 +216,7 @@ TERMS = {
     "u_p_slope": LANES,
     "pitch": LANES,
 }
-STRIP = {"airspeed": LANES, "reynolds": LANES, "fraction": LANES, "row": LANES}
+STRIP = {"airspeed": LANES, "number": LANES, "fraction": LANES, "row": LANES}
 ACCELERATION = {"specific_force": VECTOR, "angular": VECTOR}  # a_g and om', body axes
 LOADS = {"thrust": LANES, "torque": LANES, "force": VECTOR, "moment": VECTOR}  # body axes, about the hub centre
 THRUST, TORQUE, FORCE, MOMENT = 0, 1, 2, 5  # the same as columns

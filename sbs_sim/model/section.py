@@ -54,7 +54,7 @@ def section_loads(air, blade, elements, knots, table, strip, flow, pitch):
     air, blade : records AIR, BLADE
     elements : records ELEMENT, shape (elements,)
     knots : lanes, shape (knots,)
-        Reynolds numbers of the airfoil table.
+        Inner Reynolds or Mach numbers of the airfoil table.
     table : ndarray, shape (cells, 16)
     strip : records STRIP, shape (elements,)
         Memory.
@@ -67,7 +67,7 @@ def section_loads(air, blade, elements, knots, table, strip, flow, pitch):
     AirLoads
     """
     for i in range(elements.shape[0]):
-        _find_section(air, blade, elements[i], knots, strip[i], flow, pitch)
+        _find_section(blade, elements[i], knots, strip[i], flow, pitch)
     normal_force = forward_force = normal_moment = forward_moment = zeros_like(pitch)
     for i in range(elements.shape[0]):
         element, section = elements[i], strip[i]
@@ -76,8 +76,8 @@ def section_loads(air, blade, elements, knots, table, strip, flow, pitch):
         u_p = flow.u_p_hinge + flow.u_p_slope * s
         lift, lift_slope, drag, drag_slope = table_row(table, section.row, section.fraction, DEGREE)
         scale = (air.density * element.half_area) * section.airspeed
-        lift_gain = (lift + lift_slope * section.reynolds) * (scale * element.lift_factor)  # lift over airspeed
-        drag_gain = (drag + drag_slope * section.reynolds) * scale
+        lift_gain = (lift + lift_slope * section.number) * (scale * element.lift_factor)  # lift over airspeed
+        drag_gain = (drag + drag_slope * section.number) * scale
         up = lift_gain * u_t - drag_gain * u_p
         rearward = lift_gain * u_p + drag_gain * u_t
         normal_force = normal_force + up
@@ -88,31 +88,31 @@ def section_loads(air, blade, elements, knots, table, strip, flow, pitch):
 
 
 @kernel
-def _find_section(air, blade, element, knots, section, flow, pitch):
-    """Set airspeed, Reynolds number and cell of the airfoil table of one element, eq. (4.4)."""
+def _find_section(blade, element, knots, section, flow, pitch):
+    """Set airspeed, Reynolds or Mach number and cell of the airfoil table of one element, eq. (4.4)."""
     u_t = flow.u_t_hinge + flow.u_t_slope * element.span
     u_p = flow.u_p_hinge + flow.u_p_slope * element.span
     squared = u_t * u_t + u_p * u_p + TINY
     inverse_airspeed = inverse_root(squared)
     airspeed = squared * inverse_airspeed
     alpha = pitch + element.twist - angle_of(u_p, u_t, inverse_airspeed)
-    cell = table_cell(blade, knots, airspeed * (element.chord * air.inverse_viscosity), alpha)
-    section.airspeed, section.reynolds = airspeed, cell.reynolds
+    cell = table_cell(blade, knots, airspeed * element.number_scale, alpha)
+    section.airspeed, section.number = airspeed, cell.number
     section.fraction, section.row = cell.fraction, cell.row
 
 
 class TableCell(NamedTuple):
-    """Cell of the airfoil table: its row, the fraction of its width in alpha, the Reynolds number within the table."""
+    """Cell of the airfoil table: its row, the fraction of its width in alpha, the Reynolds or Mach number within the table."""
 
     row: Any
     fraction: Any
-    reynolds: Any
+    number: Any
 
 
 @kernel
-def table_cell(blade, knots, reynolds, alpha):
-    """Cell at a Reynolds number and an angle of attack [rad]; a row of the table for any values, NaN included."""
-    reynolds = minimum(maximum(reynolds, blade.min_reynolds), blade.max_reynolds)
+def table_cell(blade, knots, number, alpha):
+    """Cell at a Reynolds or Mach number and an angle of attack [rad]; a row of the table for any values, NaN included."""
+    number = minimum(maximum(number, blade.min_number), blade.max_number)
     position = (alpha - blade.first_alpha) * blade.inverse_alpha_step
     cells = blade.alpha_cells
     position = select(position < 0.0, 0.0, position)
@@ -120,5 +120,5 @@ def table_cell(blade, knots, reynolds, alpha):
     column = select(position < cells, floor(position), cells - 1.0)  # ... in a cell of the table
     row = blade.first_row + column
     for k in range(knots.shape[0]):
-        row = row + select(reynolds >= knots[k], cells, 0.0)
-    return TableCell(row, position - column, reynolds)
+        row = row + select(number >= knots[k], cells, 0.0)
+    return TableCell(row, position - column, number)

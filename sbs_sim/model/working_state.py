@@ -19,7 +19,7 @@ ADVANCE_RATIO, HOVER_INFLOW, DESCENT, FLOW, STALLED, REVERSED, OUTSIDE = range(7
 WORKING_SIZE = 7
 
 # rows of the stall angles
-REYNOLDS, HIGHEST, LOWEST = range(3)
+NUMBER, HIGHEST, LOWEST = range(3)
 
 
 @entry
@@ -34,8 +34,8 @@ def working_state(model, work, out):
     out : ndarray, shape (n_rotors, WORKING_SIZE, n)
         Output: advance ratio; hover inflow ratio of the present thrust, a_w sqrt(2 |C_T|); velocity of the hub against
         the thrust and flow through the disc with it, both over the tip speed; shares of the disc, between flap hinge
-        and tip, where sections are stalled, where the flow comes from behind, and where the Reynolds number is outside
-        of the airfoil's table, as the blades meet it now.
+        and tip, where sections are stalled, where the flow comes from behind, and where the Reynolds or Mach number
+        is outside of the airfoil's table, as the blades meet it now.
     """
     aircraft, memory = in_lanes(model), memory_in_lanes(work)
     angles, rows = as_lanes(model.stall, aircraft.blades), as_lanes(out, aircraft.rotors)
@@ -62,7 +62,7 @@ def working_state(model, work, out):
 @kernel
 def disc_fractions(aircraft, blade, terms, angles):
     """Areas of the disc, up to a common factor: stalled, in reverse flow, outside of the airfoil table, and all."""
-    air, elements = aircraft.air[0], aircraft.elements[blade.elements]
+    elements = aircraft.elements[blade.elements]
     area = stalled = reversed_ = outside = zeros_like(terms.pitch)
     for i in range(elements.shape[0]):
         element = elements[i]
@@ -71,17 +71,17 @@ def disc_fractions(aircraft, blade, terms, angles):
         squared = ut * ut + up * up + TINY
         inverse_speed = inverse_root(squared)
         alpha = terms.pitch + element.twist - angle_of(up, ut, inverse_speed)
-        reynolds = squared * inverse_speed * element.chord * air.inverse_viscosity
+        number = squared * inverse_speed * element.number_scale
         low, high = (
-            interpolated(angles[REYNOLDS], angles[LOWEST], reynolds),
-            interpolated(angles[REYNOLDS], angles[HIGHEST], reynolds),
+            interpolated(angles[NUMBER], angles[LOWEST], number),
+            interpolated(angles[NUMBER], angles[HIGHEST], number),
         )
         backwards = ut <= 0.0
         attached = (alpha >= low) & (alpha <= high)
         area = area + part
         reversed_ = reversed_ + select(backwards, part, 0.0)
         stalled = stalled + select(backwards | attached, 0.0, part)
-        known = (reynolds >= blade.min_reynolds) & (reynolds <= blade.max_reynolds)
+        known = (number >= blade.min_number) & (number <= blade.max_number)
         outside = outside + select(known, 0.0, part)
     return stalled, reversed_, outside, area
 

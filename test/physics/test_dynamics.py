@@ -153,6 +153,12 @@ AIRCRAFT = {
         ]
     },
     "two_airfoils": {"rotors": [{"airfoil": "linear_573"}, {"airfoil": "naca0012"}]},
+    # over Mach numbers that reach 0.85 at the tips, uneven steps between tables, and a single table for all numbers
+    "mach_numbers": {
+        "environment": {"speed_of_sound": 150.0},
+        "rotors": [{"airfoil": "sc1095r8"}, {"airfoil": "goettingen429"}],
+        "options": {"interpolation": "smooth"},
+    },
     "central_hinges": {"every_rotor": {"hinge_offset": 0.0, "flap_hinge_offset": 0.0}},
     "vacuum": {"environment": {"air_density": 0.0}, "every_rotor": ODD_BLADE},
     "surfaces_and_fuselage": {"body": PARTS, "rotors": TILTED},

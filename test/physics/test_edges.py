@@ -372,6 +372,27 @@ def test_reynolds_numbers_that_the_table_does_not_have_are_told(sbs):
         assert (line in point.warnings) == (least > 0.1)
 
 
+def test_of_a_table_over_the_mach_number_its_range_counts_and_the_speed_of_sound_is_physics(sbs, tmp_path):
+    """Tips at Mach 0.373 of a table that ends at 0.3: that is reached at 80 % of the radius, outside 36 % of the disc.
+
+    A table that ends at 0.4 has all of the disc. The tip's Mach number itself says nothing.
+    """
+    found = {}
+    for end in (0.3, 0.4):
+        rows = [f"{mach},{angle},{0.1 * angle},0.02" for mach in (0, end) for angle in range(-12, 13, 2)]
+        (tmp_path / f"to_{end}.csv").write_text("\n".join(["mach,alpha_deg,cl,cd", *rows]) + "\n")
+        over_mach = sbs.with_value("rotors.airfoil", str(tmp_path / f"to_{end}.csv"))
+        found[end] = trim(over_mach).warnings, states(hovering(over_mach, trim(over_mach)).snapshot())[0].outside_share
+    line = "MR1: Mach number outside 0 to 0.3, those of the airfoil table, on more than 10% of the disc"
+    assert line in found[0.3][0]
+    inside = (0.3 * 340.3 / (2400 * math.pi / 30)) ** 2 - 0.075**2
+    assert found[0.3][1] == pytest.approx(1 - inside / (0.505**2 - 0.075**2), abs=0.05)  # in steps of an element
+    assert found[0.4] == ((), 0.0)
+    cold = over_mach.with_value("environment.speed_of_sound", 320.0)
+    assert cold.parameter_hash != over_mach.parameter_hash
+    assert not any("Mach" in line for line in trim(cold).warnings)
+
+
 # --- finite, and back again -------------------------------------------------------------------------------------
 
 

@@ -442,7 +442,7 @@ def test_airfoil_table():
     """Bilinear between nodes, clamped in Reynolds number, periodic in alpha."""
     alpha = np.radians(np.array([-180.0, -90.0, 0.0, 90.0, 180.0]))
     table = SimpleNamespace(
-        reynolds=np.array([1e5, 3e5]),
+        numbers=np.array([1e5, 3e5]),
         alpha=alpha,
         cl=np.array([[0, -1, 0, 1, 0], [0, -2, 0, 2, 0]]),
         cd=np.array([[0, 1, 0, 1, 0], [0, 3, 0, 3, 0]]),

@@ -25,7 +25,7 @@ def working(model):
     """Working states of the last derivative with the angles of STALL, shape (n_rotors, WORKING_SIZE)."""
     engine = model.engine
     blades = engine.model.blades.copy()
-    blades["min_reynolds"], blades["max_reynolds"] = STALL[0, 0], STALL[0, -1]
+    blades["min_number"], blades["max_number"] = STALL[0, 0], STALL[0, -1]
     stall = np.broadcast_to(STALL[..., np.newaxis], (len(blades), *STALL.shape, blades["rotor_speed"].shape[-1]))
     known = engine.model._replace(blades=blades, stall=stall.copy())
     out = engine.memory(len(model.speeds), WORKING_SIZE)

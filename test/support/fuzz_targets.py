@@ -620,7 +620,7 @@ def check_airfoil(data: bytes) -> None:
         (folder / "a.csv").write_bytes(data)
         with refusing():
             table = read_table(folder / "a.csv", 8.0)
-            assert all(np.isfinite(values).all() for values in (table.reynolds, table.alpha, table.cl, table.cd))
+            assert all(np.isfinite(values).all() for values in (table.numbers, table.alpha, table.cl, table.cd))
             assert (table.cd > 0).all()
 
 

@@ -141,8 +141,8 @@ def make_params(ac):
         body=np.array([(*scalars, first_moment, inertia, ac.body.flat_plate_areas)], BODY),
         rotor=rotor_records(ac, names),
         element=np.stack([elements(rotor, ac.options.elements) for rotor in ac.rotors]),
-        airfoil=np.array([(len(t.reynolds) - 2, 2 * np.pi / (len(t.alpha) - 1)) for t in tables], AIRFOIL),
-        reynolds=padded([table.reynolds for table in tables]),
+        airfoil=np.array([(len(t.numbers) - 2, 2 * np.pi / (len(t.alpha) - 1)) for t in tables], AIRFOIL),
+        reynolds=padded([table.numbers for table in tables]),
         cl=padded([polynomials(table.cl, ac.options.interpolation) for table in tables]),
         cd=padded([polynomials(table.cd, ac.options.interpolation) for table in tables]),
     )

@@ -375,37 +375,37 @@ def make_blades(ac, state, psi):
 # ------------------------------------------------------------------------------------------------------------
 
 
-def airfoil_coefficients(airfoil, reynolds, alpha, interpolation):
-    """Return cl, cd: linear in Reynolds number (clamped), periodic and "linear" or "smooth" in alpha [rad].
+def airfoil_coefficients(airfoil, number, alpha, interpolation):
+    """Return cl, cd: linear in Reynolds or Mach number (clamped), periodic and "linear" or "smooth" in alpha [rad].
 
-    The table's cl and cd have shape (number of Reynolds numbers, number of angles).
+    The table's cl and cd have shape (number of Reynolds or Mach numbers, number of angles).
     """
-    table_reynolds = np.asarray(airfoil.reynolds, dtype=float)
+    numbers = np.asarray(airfoil.numbers, dtype=float)
     table_alpha = np.asarray(airfoil.alpha, dtype=float)
     alpha = (alpha - table_alpha[0]) % (2 * np.pi) + table_alpha[0]
     along = {"linear": np.interp, "smooth": monotone_cubic}[interpolation]
-    cl_of_reynolds = [along(alpha, table_alpha, row) for row in airfoil.cl]
-    cd_of_reynolds = [along(alpha, table_alpha, row) for row in airfoil.cd]
-    return (
-        np.interp(reynolds, table_reynolds, cl_of_reynolds),
-        np.interp(reynolds, table_reynolds, cd_of_reynolds),
-    )
+    cl_of_number = [along(alpha, table_alpha, row) for row in airfoil.cl]
+    cd_of_number = [along(alpha, table_alpha, row) for row in airfoil.cd]
+    return np.interp(number, numbers, cl_of_number), np.interp(number, numbers, cd_of_number)
 
 
 def monotone_cubic(x, knots, values):
-    """Return the value at x of the cubic Hermite interpolant of periodic values at equidistant knots (section 4.3)."""
-    count, step = len(knots) - 1, knots[1] - knots[0]
-    j = min(int((x - knots[0]) / step), count - 1)
+    """Return the value at x of the cubic Hermite interpolant of periodic values (section 4.4)."""
+    count = len(knots) - 1
+    j = min(int(np.searchsorted(knots, x, side="right")) - 1, count - 1)
+    widths = [knots[(j + i) % count + 1] - knots[(j + i) % count] for i in (-1, 0, 1)]
     rises = [values[(j + i) % count + 1] - values[(j + i) % count] for i in (-1, 0, 1)]
-    slopes = [limited_slope(*rises[:2]), limited_slope(*rises[1:])]
-    return CubicHermiteSpline([0.0, 1.0], values[j : j + 2], slopes)((x - knots[j]) / step)
+    slopes = [limited_slope(*rises[i : i + 2], *widths[i : i + 2]) for i in (0, 1)]
+    return CubicHermiteSpline(knots[j : j + 2], values[j : j + 2], slopes)(x)
 
 
-def limited_slope(before, after):
-    """Return the mean of two rises, none where they differ in sign, and not more than three times either."""
-    if before * after <= 0:
+def limited_slope(rise, next_rise, width, next_width):
+    """Return the middle slope of the parabola through three points: none at a turn, at most thrice that of a side."""
+    if rise * next_rise <= 0:
         return 0.0
-    return np.sign(after) * min(abs(before + after) / 2, 3 * abs(before), 3 * abs(after))
+    before, after = rise / width, next_rise / next_width
+    parabola = before + (after - before) * width / (width + next_width)
+    return np.sign(parabola) * min(abs(parabola), 3 * abs(before), 3 * abs(after))
 
 
 def along_blade(rotor, name, s):
@@ -466,9 +466,10 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
         u_p = velocity @ blade.n + induced * np.cos(blade.flap)
         # The section sees the flow across the span only: |V| is the speed in the plane of t and n.
         speed = np.hypot(u_t, u_p)
+        airfoil = ac.airfoils[rotor.airfoil]
         cl, cd = airfoil_coefficients(
-            ac.airfoils[rotor.airfoil],
-            speed * chord / air.kinematic_viscosity,
+            airfoil,
+            speed / air.speed_of_sound if airfoil.axis == "mach" else speed * chord / air.kinematic_viscosity,
             pitch - np.arctan2(u_p, u_t),
             ac.options.interpolation,
         )
@@ -977,7 +978,7 @@ def smooth_airfoil(lift_slope=5.73):
     growth = (reynolds / 3e5)[:, None] ** 0.05
     cl = growth * lift_slope / 2 * np.sin(2 * alpha)
     cd = 0.0105 / growth**5 + 1.2 * np.sin(alpha) ** 2
-    return SimpleNamespace(reynolds=reynolds, alpha=alpha, cl=cl, cd=cd)
+    return SimpleNamespace(axis="reynolds", numbers=reynolds, alpha=alpha, cl=cl, cd=cd)
 
 
 def table6_aircraft(environment=None, body=None, options=None, rotors=None):

@@ -446,7 +446,7 @@ class Aircraft(Description):
 
     @cached_property
     def stall_table(self) -> Array:
-        """Reynolds or Mach numbers and stall angles of every rotor as `working_state` takes them, shape (n_rotors, 3, n)."""
+        """Reynolds or Mach numbers and stall angles of every rotor as `working_state` takes them, (n_rotors, 3, n)."""
         size = max(len(table.numbers) for table in self.tables)
         return np.array(
             [

@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sbs_sim.aircraft.declaration import model_values
 from sbs_sim.aircraft.description import ENGINES, Body, Drive, Rotor
@@ -299,7 +299,7 @@ def _elements(aircraft: "Aircraft") -> NDArray[Any]:
     return elements
 
 
-def number_scale(aircraft: "Aircraft", rotor: int, chord: ArrayLike) -> Any:
+def number_scale(aircraft: "Aircraft", rotor: int, chord: Any) -> Any:
     """Reynolds or Mach number, whichever the rotor's airfoil table is over, of a section over its airspeed [s/m]."""
     environment = aircraft.environment
     if aircraft.tables[rotor].axis == "mach":

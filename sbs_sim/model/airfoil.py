@@ -234,7 +234,7 @@ def extend_polar(alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: f
     past_180 = np.where(circle > 0, circle - np.pi, circle + np.pi)
     unstalled = (np.abs(circle) > np.pi / 2) & (past_180 > -high) & (past_180 < low)
     circle_cd[unstalled] = cd[-1] + (past_180[unstalled] + high) * ((cd[0] - cd[-1]) / (low + high))
-    return circle, circle_cl, circle_cd
+    return np.asarray(circle, np.float64), circle_cl, circle_cd
 
 
 def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:

@@ -102,7 +102,7 @@ def _find_section(blade, element, knots, section, flow, pitch):
 
 
 class TableCell(NamedTuple):
-    """Cell of the airfoil table: its row, the fraction of its width in alpha, the Reynolds or Mach number within the table."""
+    """Cell of the airfoil table: its row, fraction of its width in alpha, Reynolds or Mach number within the table."""
 
     row: Any
     fraction: Any
@@ -111,7 +111,7 @@ class TableCell(NamedTuple):
 
 @kernel
 def table_cell(blade, knots, number, alpha):
-    """Cell at a Reynolds or Mach number and an angle of attack [rad]; a row of the table for any values, NaN included."""
+    """Cell at a Reynolds or Mach number and an angle of attack [rad]; a row for any values, NaN included."""
     number = minimum(maximum(number, blade.min_number), blade.max_number)
     position = (alpha - blade.first_alpha) * blade.inverse_alpha_step
     cells = blade.alpha_cells

@@ -26,7 +26,7 @@ DATA = Path(__file__).resolve().parents[1] / "data"
 SHIPPED = sorted(path.stem for path in (config_folder() / "aircraft").glob("*.yaml"))
 SBS_TEXT = (config_folder() / "aircraft" / "sbs.yaml").read_text(encoding="utf-8")
 SCHEMA = json.loads((config_folder() / "aircraft.schema.json").read_text(encoding="utf-8"))
-AIRFOIL_NAMES = "linear_573, naca0012"
+AIRFOIL_NAMES = ", ".join(sorted(path.stem for path in (config_folder() / "airfoils").glob("*.csv")))
 YAML_FILE = YAML(typ="safe", pure=True)
 
 
@@ -318,7 +318,7 @@ def schema_leaves(schema, path=()):
 
 
 # in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py
-ELSEWHERE = ("stand", "altitude", "temperature_offset", "surfaces", "fuselage")
+ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage")
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from plain_model import airfoil_coefficients
 
 from sbs_sim.errors import AirfoilError, SbsError
 from sbs_sim.lanes import as_lanes, as_records, table_row
@@ -26,8 +27,6 @@ from sbs_sim.model.airfoil import (
 from sbs_sim.model.frames import ONE
 from sbs_sim.model.records import BLADE, records
 from sbs_sim.model.section import DEGREE, table_cell
-
-from plain_model import airfoil_coefficients
 
 ROOT = Path(__file__).resolve().parents[2]
 AIRFOILS = ROOT / "config" / "airfoils"
@@ -626,7 +625,8 @@ BAD_ROWS = {
     ),
     "uneven without a common step": (
         [*block(1e5, [-10, -5, 1.002, 2]), *block(2e5, [-10, -5, 1.002, 2])],
-        "5: alpha_deg 1.002 must be a multiple of a step that divides 180, that all angles have, and that is 0.05 or more",
+        "5: alpha_deg 1.002 must be a multiple of a step that divides 180, that all angles have, and that is 0.05"
+        " or more",
     ),
     "coarse beside 30 deg": (
         [*block(1e5, [-40, -20, 0, 10]), *block(2e5, [-40, -20, 0, 10])],

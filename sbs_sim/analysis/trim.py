@@ -70,8 +70,9 @@ def trim(
     Raises
     ------
     TrimError
-        A value out of range, or no solution: the message says what stops it (rotors that cannot carry the weight,
-        a rotor that stalls, a control beyond its range), and with the attributes which equation is left with what.
+        A value out of range, an aircraft on a stand, or no solution: the message says what stops it (rotors that cannot
+        carry the weight, a rotor that stalls, a control beyond its range), and with the attributes which equation is
+        left with what.
     """
     checks.instance("aircraft", aircraft, Aircraft, TrimError)
     condition = TrimCondition(airspeed, climb_rate, sideslip, turn_rate)
@@ -90,6 +91,8 @@ def solve_trim(
     """Trim an aircraft in a flight condition; see `trim`."""
     checks.instance("aircraft", aircraft, Aircraft, TrimError)
     checks.choice("method", method, METHODS, TrimError)
+    if aircraft.body.is_stand:
+        raise TrimError("body.stand: allowed is none for a trim; IsolatedRotor solves a rotor on a stand")
     if method == "two_loop" and aircraft.drives:
         raise TrimError("method = 'two_loop': allowed with drives is newton")
     problem = TrimProblem(aircraft, fidelity)

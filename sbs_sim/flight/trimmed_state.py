@@ -44,9 +44,11 @@ def trimmed_state(
     Raises
     ------
     SimulationError
-        A trim of an aircraft with other rotors; a heading that is not finite or far from a turn. Position and velocity
-        are checked by `Simulation`.
+        A trim of an aircraft with other rotors; an aircraft on a stand; a heading that is not finite or far from a
+        turn. Position and velocity are checked by `Simulation`.
     """
+    if aircraft.body.is_stand:
+        raise SimulationError("body.stand: allowed is none for a start from a trim; give a state on a stand")
     if point.state_names != aircraft.layout.linear_names:
         own = ", ".join(str(rotor.blades) for rotor in aircraft.rotors)
         raise SimulationError(

@@ -19,7 +19,8 @@ MAX_ADVANCE_RATIO = 0.4
 MAX_STALLED = 0.1  # of the disc; the sections know nothing of dynamic stall
 MAX_REVERSED = 0.1  # of the disc; reached at an advance ratio of 0.63, where the circle of reverse flow has mu^2 / 4
 # Of airfoil tables over the Reynolds number, which have no Mach number. By the rule of Prandtl and Glauert (J. D.
-# Anderson: Fundamentals of aerodynamics, section 11.4) a section lifts 1 / sqrt(1 - M^2) of what it does in incompressible flow: 11 % more at this one.
+# Anderson: Fundamentals of aerodynamics, section 11.4) a section lifts 1 / sqrt(1 - M^2) of what it does in
+# incompressible flow: 11 % more at this one.
 MAX_TIP_MACH = 0.44
 INCOMPRESSIBLE = "where incompressible section data do not hold"
 MAX_OUTSIDE = 0.1  # of the disc, with Reynolds or Mach numbers that the airfoil's table does not have

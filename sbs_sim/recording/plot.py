@@ -108,10 +108,10 @@ def _draw(axes: Axes, label: str, curves: Curves) -> None:
         axes.plot(
             time, values, color=COLOURS[i % len(COLOURS)], linestyle=DASHES[i % len(DASHES)], linewidth=1.2, label=name
         )
-        largest = max(largest, float(np.nanmax(np.abs(values), initial=0.0)))
+        largest = max(largest, float(np.abs(values[np.isfinite(values)]).max(initial=0.0)))
     low, high = axes.get_ylim()
     if high - low < 1e-3 * largest:  # rounding is no signal
-        middle = 0.5 * (low + high)
+        middle = 0.5 * low + 0.5 * high  # of numbers whose sum may not be one
         axes.set_ylim(middle - 0.05 * largest, middle + 0.05 * largest)
     axes.set_ylabel(label)
     axes.grid(color="#dddddd", linewidth=0.6)

@@ -22,6 +22,7 @@ import zstandard
 from foreign_logs import merge
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 from mcap.reader import make_reader
 from mcap.records import Channel, Schema
 from mcap.stream_reader import StreamReader
@@ -38,6 +39,7 @@ from sbs_sim.recording.definitions import SEQUENCE, Units, fields_of, parse, sho
 from sbs_sim.recording.log_writer import CHUNK_SIZE
 from sbs_sim.recording.mcap_file import NewFile, metadata_checksum
 from sbs_sim.recording.playback import Playback
+from sbs_sim.recording.plot import _draw
 from sbs_sim.recording.recorded_flight import flight_of
 from sbs_sim.recording.scan import scan
 from sbs_sim.recording.source import Source
@@ -1595,3 +1597,10 @@ def test_a_scan_hands_out_nothing_without_a_checksum(original, tmp_path):
     assert contents == []
     assert not found.complete
     assert len(found.chunks) == 0
+
+
+@pytest.mark.parametrize("strange", [np.inf, -np.inf, np.nan, 1.7e308])
+def test_values_that_are_no_numbers_are_drawn_around(strange):
+    axes = Figure().subplots()
+    _draw(axes, "anything", {"value": (np.arange(4.0), np.array([1.0, strange, 1.0, 1.0]))})
+    assert np.isfinite(axes.get_ylim()).all()

@@ -100,7 +100,7 @@ def _work(arguments: argparse.Namespace) -> None:
     results, warnings = {}, {}
     for name, (air, settling, duration) in airs.items():
         flight = _flown(craft, model, found, air, settling + duration, arguments.delay)
-        results[name], warnings[name] = _figures(flight, settling), flight.warnings
+        results[name], warnings[name] = _figures(craft, flight, settling), flight.warnings
     _print(results)
     for name, lines in warnings.items():
         for line in lines:
@@ -138,11 +138,9 @@ def _flown(
     return simulate_with_pilot(craft, model.trim, HoverHold(found).controls, duration, wind=air, delay=delay)
 
 
-def _figures(flight: Any, settling: float) -> dict[str, float]:
-    """Errors of place [m] and heading [rad], and the motion of the controls [rad], from a time [s] on."""
+def _figures(craft: "Aircraft", flight: Any, settling: float) -> dict[str, float]:
+    """Errors of place [m] and heading [rad], and the motion of the controls of the axes [rad], from a time [s] on."""
     import numpy as np
-
-    from sbs_sim.model.state import CONTROL_NAMES
 
     used = flight["time"] >= settling
     error = np.stack([flight[name][used] for name in PLACE])
@@ -153,7 +151,7 @@ def _figures(flight: Any, settling: float) -> dict[str, float]:
     figures |= {"rms_distance": _rms(distance), "largest_distance": float(distance.max())}
     figures |= {"rms_heading": _rms(heading)}
     spread = flight["controls"][used].std(axis=0)
-    return figures | {f"std_{name}": float(value) for name, value in zip(CONTROL_NAMES, spread, strict=True)}
+    return figures | {f"std_{craft.control_names[i]}": float(spread[i]) for i in craft.axis_controls}
 
 
 def _rms(values: Any) -> float:

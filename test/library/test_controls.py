@@ -7,6 +7,7 @@ import pytest
 from helpers import PITCH_PER_INCH, renamed_data
 
 from sbs_sim import Aircraft, linearize, simulate, trim
+from sbs_sim.commands.gusts import _figures
 from sbs_sim.errors import AircraftError, PilotError, SimulationError
 from sbs_sim.flight.mixer import Mixer
 from sbs_sim.pilot.augmentation import augmentation
@@ -103,6 +104,9 @@ def test_a_controller_holds_hover_by_controls_of_other_names(sbs):
     assert pilot.controls(0.0, state).shape == (5,)
     flight = simulate_with_pilot(aircraft, hover, HoverHold(ours).controls, 0.5)
     assert np.abs(flight["state"][-1, :3]).max() < 0.01
+    figures = _figures(aircraft, flight, 0.0)
+    assert figures["std_lever"] == flight["controls"][:, aircraft.control_names.index("lever")].std()
+    assert list(figures)[-4:] == ["std_lever", "std_stick_right", "std_stick_forward", "std_pedal"]
     assert augmentation(linearize(aircraft)).senses.tolist() == augmentation(linearize(sbs)).senses.tolist()
 
 

@@ -356,6 +356,20 @@ def _offsets() -> Any:
     return declared(text, schema, angles, unit="deg", default={})
 
 
+def _linkage(letter: str, text: str) -> Any:
+    """Field with a length of the linkage of the axial lag damper."""
+    return number(
+        text,
+        -50,
+        50,
+        "m",
+        key=f"lag_damper.{letter}",
+        symbol=f"h_{letter}",
+        model_field=f"damper_{letter}",
+        default=0.0,
+    )
+
+
 MAX_STATIONS = 200
 
 
@@ -463,56 +477,13 @@ class Rotor(ByContent):
         model_field="damper_damping",
         default=0.0,
     )
-    damper_a: float = number(
-        "Linkage of the axial lag damper: its end on the blade, above the blade's axis, at zero flap",
-        -50,
-        50,
-        "m",
-        key="lag_damper.a",
-        symbol=r"h_a",
-        model_field="damper_a",
-        default=0.0,
+    damper_a: float = _linkage(
+        "a", "Linkage of the axial lag damper: its end on the blade, above the blade's axis, at zero flap"
     )
-    damper_b: float = number(
-        "Linkage: the same end, along the span from the hinges at the rest angle of lag",
-        -50,
-        50,
-        "m",
-        key="lag_damper.b",
-        symbol=r"h_b",
-        model_field="damper_b",
-        default=0.0,
-    )
-    damper_c: float = number(
-        "Linkage: its end on the hub, inboard of the hinges",
-        -50,
-        50,
-        "m",
-        key="lag_damper.c",
-        symbol=r"h_c",
-        model_field="damper_c",
-        default=0.0,
-    )
-    damper_d: float = number(
-        "Linkage: its end on the blade, ahead of the hinges against lag",
-        -50,
-        50,
-        "m",
-        key="lag_damper.d",
-        symbol=r"h_d",
-        model_field="damper_d",
-        default=0.0,
-    )
-    damper_r: float = number(
-        "Linkage: lever of the end on the hub, which turns with the pitch",
-        -50,
-        50,
-        "m",
-        key="lag_damper.r",
-        symbol=r"h_r",
-        model_field="damper_r",
-        default=0.0,
-    )
+    damper_b: float = _linkage("b", "Linkage: the same end, along the span from the hinges at the rest angle of lag")
+    damper_c: float = _linkage("c", "Linkage: its end on the hub, inboard of the hinges")
+    damper_d: float = _linkage("d", "Linkage: its end on the blade, ahead of the hinges against lag")
+    damper_r: float = _linkage("r", "Linkage: lever of the end on the hub, which turns with the pitch")
     pitch_flap_coupling: float = number(
         "Blade pitch taken off per flap angle",
         -10,

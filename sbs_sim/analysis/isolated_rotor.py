@@ -19,7 +19,6 @@ from sbs_sim.flight.trim_point import Fidelity, TrimCondition
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
-from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.steady import steady_balance
 
@@ -195,7 +194,7 @@ class IsolatedRotor:
             count, slopes = part.stop - part.start, engine.tick.slopes[0]
             given, places = engine.lanes(list(states[part])), engine.lanes(list(psi[part]))
             if len(self._free):
-                derivative(engine.model, given, angles, places, still_air, engine.work, slopes, True)
+                engine.derivative(engine.model, given, angles, places, still_air, engine.work, slopes, True)
             else:
                 steady_balance(engine.model, given, angles, places, still_air, engine.work, slopes, left)
             rates[part], loads[part] = slopes[:, :count].T, engine.work.load_rows[:, :count].T

@@ -28,6 +28,7 @@ from sbs_sim.errors import AircraftError, SbsError, SweepError
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.output.notebook import sweep_html
+from sbs_sim.output.units import shown
 
 if TYPE_CHECKING:
     import distributed
@@ -101,9 +102,7 @@ class Sweep:
     def shown(self) -> tuple[Array, str]:
         """Values of the parameter as a person reads them, and their unit: angles of the flight in degrees."""
         unit = self.unit(self.parameter)
-        if self.parameter in CONDITIONS and unit.startswith("rad"):
-            return np.degrees(self.values), unit.replace("rad", "deg")
-        return self.values, unit
+        return shown(self.values, unit) if self.parameter in CONDITIONS else (self.values, unit)
 
     @cached_property
     def failed(self) -> tuple[SweepPoint, ...]:

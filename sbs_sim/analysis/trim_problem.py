@@ -5,8 +5,7 @@ the averages of the six body accelerations, of the flap and lag accelerations an
 """
 
 import copy
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +21,14 @@ from sbs_sim.model.average import azimuths
 from sbs_sim.model.balance import trim_residuals, trim_sides
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
+from sbs_sim.output.units import shown
 
 Array = NDArray[np.float64]
 
 ATTITUDE_UNKNOWNS, CONTROL_UNKNOWNS = 2, 4
 BODY_UNKNOWNS = ATTITUDE_UNKNOWNS + CONTROL_UNKNOWNS
 BODY_STEP, ROTOR_STEP = 1e-5, 1e-6  # of the differences: m/s, rad/s, rad; rad, inflow ratio
-ROUNDING = 1e-10  # deg, or another unit, that a value may be beyond its limit
+ROUNDING = 1e-12  # rad, or another unit, that a value may be beyond its limit
 UNEQUAL_BLADES = "blades with unequal lag dampers: this is a mean over a revolution, stability needs Floquet's method"
 JACOBIAN_AZIMUTHS = 4  # enough to say where to go, the residual says where to stop
 BODY_BALANCES = (
@@ -298,20 +298,21 @@ def _drive_states(drive: Drive, speed: float, own: dict[str, float]) -> dict[str
 def _beyond_limits(aircraft: Aircraft, controls: Array, swash: Array) -> tuple[str, ...]:
     """What lies beyond its range, as "name = value deg: allowed are low to high deg"."""
     found = [
-        _outside(control.name, control.shown(value), [control.shown(end) for end in control.range], control.shown_unit)
+        _outside(control.name, value, control.range, control.unit)
         for control, value in zip(aircraft.controls, controls.tolist(), strict=True)
     ]
     for rotor, angles in zip(aircraft.rotors, swash, strict=True):
         ranges = (rotor.collective_range, rotor.cyclic_range, rotor.cyclic_range)
         found += [
-            _outside(f"{rotor.name} {name}", math.degrees(value), np.degrees(limits), "deg")
+            _outside(f"{rotor.name} {name}", value, limits, "rad")
             for name, value, limits in zip(S.SWASHPLATE_NAMES, angles, ranges, strict=True)
         ]
     return tuple(text for text in found if text)
 
 
-def _outside(name: str, value: float, limits: Iterable[float], unit: str) -> str:
+def _outside(name: str, value: float, limits: tuple[float, float], unit: str) -> str:
     low, high = limits
     if low - ROUNDING <= value <= high + ROUNDING:
         return ""
+    (value, low, high), unit = shown([value, low, high], unit)
     return f"{name} = {value:.3f} {unit}: allowed are {low:g} to {high:g} {unit}"

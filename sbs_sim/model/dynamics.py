@@ -292,11 +292,19 @@ def blade_pose(aircraft, x, blade, psi):
 
 
 @kernel
+def swashplate_azimuth(blade, pose):
+    """Cosine and sine of psi_k + psi_s."""
+    return (
+        pose.cosine * blade.cos_phase - pose.sine * blade.sin_phase,
+        pose.sine * blade.cos_phase + pose.cosine * blade.sin_phase,
+    )
+
+
+@kernel
 def blade_pitch(aircraft, blade, pose, swash):
     """Pitch of blades at the hinge [rad], eq. (4.8)."""
     angles, quad = aircraft.indices.swash, blade.quad
-    cosine = pose.cosine * blade.cos_phase - pose.sine * blade.sin_phase  # of psi_k + psi_s
-    sine = pose.sine * blade.cos_phase + pose.cosine * blade.sin_phase
+    cosine, sine = swashplate_azimuth(blade, pose)
     collective = spread(swash, angles[S.COLLECTIVE], quad, blade)
     lateral = spread(swash, angles[S.LATERAL], quad, blade)
     longitudinal = spread(swash, angles[S.LONGITUDINAL], quad, blade)
@@ -313,8 +321,7 @@ def blade_pitch(aircraft, blade, pose, swash):
 def pitch_rate(aircraft, blade, pose, swash):
     """Rate of the pitch of blades [rad/s], eq. (4.8) differentiated, with swashplates that stand still."""
     angles, quad = aircraft.indices.swash, blade.quad
-    cosine = pose.cosine * blade.cos_phase - pose.sine * blade.sin_phase  # of psi_k + psi_s
-    sine = pose.sine * blade.cos_phase + pose.cosine * blade.sin_phase
+    cosine, sine = swashplate_azimuth(blade, pose)
     lateral = spread(swash, angles[S.LATERAL], quad, blade)
     longitudinal = spread(swash, angles[S.LONGITUDINAL], quad, blade)
     by_azimuth = blade.sense * lateral * sine - longitudinal * cosine

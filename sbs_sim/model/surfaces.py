@@ -1,9 +1,8 @@
 """Air loads of lifting surfaces and of a fuselage with tables (theory.md sections 5.8 and 5.9)."""
 
-from typing import Any, NamedTuple
-
 from sbs_sim.lanes import ZERO, Vector, cross, dot, floor, maximum, select, sqrt, table_row, zeros_like
 from sbs_sim.model import state as S
+from sbs_sim.model.blade import ForceMoment
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.trigonometry import TINY, angle_of, inverse_root
 
@@ -12,13 +11,6 @@ DEGREE = 3  # of the interpolation along the angle of attack
 # changes of the slopes of the wash over it.
 AIRSPEED, INCIDENCE, SKEW, DOWN, AFT = range(5)
 RAMP_COLUMNS = 5
-
-
-class Load(NamedTuple):
-    """Force [N], and moment about the c.g. [N m], body axes."""
-
-    force: Any
-    moment: Any
 
 
 @kernel
@@ -40,7 +32,8 @@ def surface_load(density, surface, ramps, shapes, motion, omega, wash):
 
     Returns
     -------
-    Load
+    ForceMoment
+        About the c.g., body axes [N, N m].
     """
     own = motion + cross(omega, surface.position)
     incidence = surface.incidence
@@ -59,7 +52,7 @@ def surface_load(density, surface, ramps, shapes, motion, omega, wash):
     ahead = lift_gain * w - drag_gain * u
     below = -(lift_gain * u + drag_gain * w)
     force = Vector(ahead, ZERO, ZERO) + surface.down * below
-    return Load(force, cross(surface.position, force))
+    return ForceMoment(force, cross(surface.position, force))
 
 
 @kernel
@@ -96,7 +89,7 @@ def fuselage_load(density, fuselage, shapes, motion, omega, wash):
         + right * (pressure * (pitch + pitch_rise * y))
         + down * (pressure * (yaw + yaw_rise * y))
     )
-    return Load(force, moment + cross(fuselage.position, force))
+    return ForceMoment(force, moment + cross(fuselage.position, force))
 
 
 @kernel

@@ -42,6 +42,7 @@ from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.state import harmonic_count
 from sbs_sim.model.wind import MAX_WIND, Wind
+from sbs_sim.recording.recorded_flight import DRIVE_FIELDS
 
 Array = NDArray[np.float64]
 
@@ -49,7 +50,6 @@ FRAME_NED = "ned"
 FRAME_BODY = "base_link_frd"
 FRAME_ODOM = "odom"
 FRAME_BASE = "base_link"
-DRIVE_FIELDS = {S.SPEED: "speed"}  # of DriveState, where they are not called as the state is
 BLADE_FIELDS = ("flap", "flap_rate", "lag", "lag_rate", "blade_flap", "blade_lag")
 HALF = math.sqrt(0.5)
 MAX_VALUE = 1e9  # of any number of a flight that can be shown

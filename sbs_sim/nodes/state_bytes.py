@@ -15,8 +15,9 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.flight.records import Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
-from sbs_sim.nodes.conversions import DRIVE_FIELDS, BladeAngles, StateMessages, enu_flu_quaternion, to_time
+from sbs_sim.nodes.conversions import BladeAngles, StateMessages, enu_flu_quaternion, to_time
 from sbs_sim.nodes.templates import BYTE, COUNT, DOUBLE, INT, UINT, LayoutError, Template
+from sbs_sim.recording.recorded_flight import DRIVE_FIELDS
 
 Array = NDArray[np.float64]
 

@@ -29,6 +29,7 @@ OPTIONS = {"tick": float, "azimuth_step": float, "lead_lag": bool, "cyclic_inflo
 GROUND = "ground_altitude"  # an option too; older logs have none
 WIND_VECTORS = ("velocity", "gust", "turbulence_intensity")
 WIND_NUMBERS = ("gust_delay", "gust_duration", "turbulence_length", "turbulence_airspeed", "turbulence_direction")
+DRIVE_FIELDS = {SPEED: "speed"}  # of DriveState, where they are not called as the state is
 EVENT_COUNTS = ("wind_step", "wind_ticks", "drive")  # older logs have none of them
 MAX_STATE_TIME = 10**17  # ns, three years of flight
 MAX_STATE_GAP = 1e4  # s without a state; to fly through a damaged time would take for ever
@@ -201,8 +202,7 @@ def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, A
             states[:, index] = inflow[f"rotors[{j}].{name}"][where[2]]
     for i in range(len(layout.drives)):
         for name, place in layout.drive(i).items():
-            field = "speed" if name == SPEED else name
-            states[:, place] = rotors[f"drives[{i}].{field}"][where[1]]
+            states[:, place] = rotors[f"drives[{i}].{DRIVE_FIELDS.get(name, name)}"][where[1]]
     return np.round(times * 1e-9 / step_size).astype(np.int64), states
 
 

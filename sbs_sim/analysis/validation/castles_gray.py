@@ -2,10 +2,9 @@
 
 import math
 
-from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
 from sbs_sim.analysis.validation.comparison import Aim, Case, Row, compared
-from sbs_sim.analysis.validation.published import data
+from sbs_sim.analysis.validation.published import craft, data
 from sbs_sim.flight.trim_point import Fidelity
 
 THRUST_AIM = Aim(share=0.15, absolute=0.0003, why="thrust coefficient: 15 %, or 0.0003 where that is more: its scatter")
@@ -46,8 +45,8 @@ def case() -> Case:
 
 
 def _run(speed: float, points: list[tuple[float, float, float | None]]) -> list[Row]:
-    craft = Aircraft.load("castles_gray").with_value("rotors.speed_rpm", speed)
-    rotor, rows = IsolatedRotor(craft, Fidelity(lead_lag=False)), list[Row]()
+    rotating = craft("castles_gray").with_value("rotors.speed_rpm", speed)
+    rotor, rows = IsolatedRotor(rotating, Fidelity(lead_lag=False)), list[Row]()
     idle = rotor.steady((0.0, 0.0, 0.0)).torque_coefficient
     for collective, thrust, torque in points:
         point = rotor.steady((math.radians(collective), 0.0, 0.0))

@@ -106,8 +106,7 @@ class Case:
     @property
     def verdict(self) -> str:
         """MISSED if one row is; MET if one is and none is missed."""
-        verdicts = {row.verdict for row in self.rows}
-        return next((verdict for verdict in (MISSED, MET) if verdict in verdicts), COMPARED)
+        return _verdict(self.rows)
 
     def count(self, verdict: str) -> int:
         """Number of rows with a verdict."""
@@ -124,7 +123,7 @@ class Report:
     @property
     def verdict(self) -> str:
         """MISSED if one case is."""
-        return Case("", "", "", "", (), tuple(row for case in self.cases for row in case.rows)).verdict
+        return _verdict(row for case in self.cases for row in case.rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as numbers and texts; for JSON."""
@@ -134,6 +133,12 @@ class Report:
             **_spread_entry(row for case in self.cases for row in case.rows),
             "cases": [_case_entry(case) for case in self.cases],
         }
+
+
+def _verdict(rows: Iterable[Row]) -> str:
+    """MISSED if one of the rows is; MET if one is and none is missed."""
+    verdicts = {row.verdict for row in rows}
+    return next((verdict for verdict in (MISSED, MET) if verdict in verdicts), COMPARED)
 
 
 def compared(

@@ -4,10 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
 from sbs_sim.analysis.validation.comparison import Aim, Case, Row, compared
-from sbs_sim.analysis.validation.published import data
+from sbs_sim.analysis.validation.published import craft, data
 from sbs_sim.flight.trim_point import Fidelity
 
 Array = NDArray[np.float64]
@@ -49,7 +48,7 @@ def _eigenvalue_rows(speed: float, published: list[list[float]]) -> list[Row]:
 
 def eigenvalues(values: dict[str, float | list[float]]) -> NDArray[np.complex128]:
     """Eigenvalues [1/s] of the aircraft hammond with values changed."""
-    rotor = IsolatedRotor(Aircraft.load("hammond").with_values(values), ONE_AZIMUTH)
+    rotor = IsolatedRotor(craft("hammond").with_values(values), ONE_AZIMUTH)
     matrix = rotor.matrix(rotor.steady((0.0, 0.0, 0.0)), inflow=False)[0]
     return np.linalg.eigvals(matrix).astype(np.complex128)
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.validation.comparison import Aim, Case, compared
-from sbs_sim.analysis.validation.published import data
+from sbs_sim.analysis.validation.published import craft, data
 from sbs_sim.flight.engine import points_engine
 from sbs_sim.model.inflow import inflow_matrix
 
@@ -43,10 +42,10 @@ def eigenmatrix(v0: float) -> np.ndarray:
 
 def _rates(v0: float, place: int, step: float) -> np.ndarray:
     """What the inflow itself gives to its rates, over Omega: the loads that are held fall out of the differences."""
-    craft = Aircraft.load("sbs")
-    engine = points_engine(craft.arranged(True, True, "points"))
+    sbs = craft("sbs")
+    engine = points_engine(sbs.arranged(True, True, "points"))
     states = np.array([v0, 0.0, 0.0])
     states[place] += step
     out = engine.memory(3, 3)
     inflow_matrix(engine.model.rotors, 0, engine.lanes([states[:1]]), engine.memory(3), 1, out)
-    return np.asarray(out[..., 0] @ states / craft.rotors[0].speed)
+    return np.asarray(out[..., 0] @ states / sbs.rotors[0].speed)

@@ -16,7 +16,6 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SimulationError
 from sbs_sim.model.state import SWASHPLATE_NAMES
-from sbs_sim.output.units import shown
 
 Array = NDArray[np.float64]
 
@@ -65,9 +64,13 @@ class Mixer:
         clipped = np.clip(values, self._low, self._high)
         wanted = self.aircraft.mix(clipped)
         self._target = np.clip(wanted, self._swash_low, self._swash_high)
-        texts = _clipped([(control.name, control.unit) for control in self.aircraft.controls], values, clipped)
+        texts = [
+            f"{control.name} at its limit of {control.shown(limit):.6g} {control.shown_unit}"
+            for control, value, limit in zip(self.aircraft.controls, values.tolist(), clipped.tolist(), strict=True)
+            if abs(value - limit) > ROUNDING
+        ]
         for rotor, row, limited in zip(self.aircraft.rotors, wanted, self._target, strict=True):
-            texts += _clipped([(f"{rotor.name} {name}", "rad") for name in SWASHPLATE_NAMES], row, limited)
+            texts += _clipped([f"{rotor.name} {name}" for name in SWASHPLATE_NAMES], row, limited)
         self.saturated = tuple(texts)
 
     def set_position(self, angles: ArrayLike) -> None:
@@ -151,10 +154,9 @@ def check_ranges(aircraft: Aircraft, values: Array, where: str = "") -> None:
             raise SimulationError(f"{where}{control.name} = {value:.6g}: allowed are {limits}")
 
 
-def _clipped(named: list[tuple[str, str]], wanted: Array, limited: Array) -> list[str]:
-    """What was limited, of values with their names and units."""
+def _clipped(names: tuple[str, ...] | list[str], wanted: Array, limited: Array) -> list[str]:
     return [
-        "{} at its limit of {:.6g} {}".format(name, *shown(limit, unit))
-        for (name, unit), value, limit in zip(named, wanted, limited, strict=True)
+        f"{name} at its limit of {math.degrees(limit):.6g} deg"
+        for name, value, limit in zip(names, wanted, limited, strict=True)
         if abs(value - limit) > ROUNDING
     ]

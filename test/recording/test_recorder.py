@@ -301,14 +301,14 @@ def test_who_does_not_heed_a_closed_terminal_is_left_alone():
 def test_interruptions_that_arrive_at_once_end_a_command_without_a_word():
     """Blocked and let go together, as a busy machine delivers Ctrl-C and the closing of a terminal."""
     code = """
-        import os, signal
+        import signal, threading
         from sbs_sim.nodes import replay
         from sbs_sim.nodes.signals import ignore_interruptions, when_interrupted
         both = (signal.SIGINT, signal.SIGTERM)
         when_interrupted(replay._interrupt)
         signal.pthread_sigmask(signal.SIG_BLOCK, both)
-        for number in both:
-            os.kill(os.getpid(), number)
+        for number in both:  # to this thread: those of libraries do not block them
+            signal.pthread_kill(threading.get_ident(), number)
         try:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, both)
         except KeyboardInterrupt:

@@ -5,9 +5,16 @@ import signal
 import pytest
 from hypothesis import settings
 
-# What a script starts in the background ignores Ctrl-C, and so would every process that the tests start and interrupt.
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+INTERRUPTIONS = {
+    signal.SIGINT: signal.default_int_handler,
+    signal.SIGTERM: signal.SIG_DFL,
+    signal.SIGHUP: signal.SIG_DFL,
+}
+# What a script starts in the background ignores Ctrl-C, and under nohup SIGHUP; and so would every process that the
+# tests start and interrupt.
+for number, default in INTERRUPTIONS.items():
+    if signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, default)
 
 # How long one example takes says more about the machine than about the code.
 settings.register_profile("no_deadline", deadline=None)
@@ -17,6 +24,17 @@ settings.load_profile("no_deadline")
 def pytest_collection_modifyitems(items):
     """The files whose tests wait for processes and their discovery first: at the end nobody should wait for them."""
     items.sort(key=lambda item: not hasattr(item.module, "DOMAINS"))
+
+
+@pytest.fixture(autouse=True)
+def _handlers_of_interruptions_stay():
+    """What a test ignores, the processes of all later tests would ignore: they inherit it."""
+    before = {number: signal.getsignal(number) for number in INTERRUPTIONS}
+    yield
+    after = {number: signal.getsignal(number) for number in INTERRUPTIONS}
+    for number, handler in before.items():
+        signal.signal(number, handler)
+    assert after == before
 
 
 @pytest.fixture(scope="session")

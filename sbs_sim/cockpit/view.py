@@ -243,11 +243,11 @@ class View:
             shown = live if self._recording is None else self._replayed(self._recording, elapsed)
             self._frames += 1
             if self._frames % READOUT_EVERY == 0:
-                log = "" if self._recording is None else self._recording.path.name
-                self._source.content = source_line(log, live is not None and not live.gone)
-                if self._fly is not None:
+                if self._fly is not None:  # first: what is said to be live takes the keys
                     gone = live is None or live.gone
                     self._fly.steer(LOG_SHOWN if self._recording is not None else GONE if gone else "")
+                log = "" if self._recording is None else self._recording.path.name
+                self._source.content = source_line(log, live is not None and not live.gone)
             if shown is None or self._scene is None:
                 return
             if not self._server.get_clients():  # no client: only the histories go on

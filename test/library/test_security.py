@@ -18,7 +18,6 @@ rclpy = pytest.importorskip("rclpy")
 from ros_harness import DOMAINS, EXECUTABLES, environment, world  # noqa: E402
 
 from sbs_msgs.msg import BodyState  # noqa: E402
-from sbs_sim.nodes.process import run  # noqa: E402
 
 IS_OLD_DDS = "/libfastrtps.so" in Path("/proc/self/maps").read_text()
 ROOT = Path(__file__).resolve().parents[2]
@@ -147,14 +146,12 @@ WRONG_ROS_ARGUMENTS = [
 
 
 @pytest.mark.parametrize(("arguments", "code"), WRONG_ROS_ARGUMENTS, ids=lambda item: str(item))
-def test_wrong_arguments_for_ros_are_one_line(capfd, arguments, code):
-    def no_nodes():
-        from sbs_sim.nodes.simulator import Simulator
-
-        return [Simulator()]
-
-    assert run(no_nodes, ["simulator", "--ros-args", *arguments]) == code
-    lines = [line for line in capfd.readouterr().err.strip().splitlines() if "[rcl]" not in line]  # ROS has its own
+def test_wrong_arguments_for_ros_are_one_line(tmp_path, arguments, code):
+    command = [sys.executable, EXECUTABLES / "simulator", "--ros-args", *arguments]
+    own = environment(next(DOMAINS), tmp_path)
+    ended = subprocess.run(command, env=own, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == code
+    lines = [line for line in ended.stderr.strip().splitlines() if "[rcl]" not in line]  # ROS has its own
     assert len(lines) == 1, lines
 
 

@@ -110,8 +110,8 @@ def _draw(axes: Axes, label: str, curves: Curves) -> None:
         )
         largest = max(largest, float(np.abs(values[np.isfinite(values)]).max(initial=0.0)))
     low, high = axes.get_ylim()
-    if high - low < 1e-3 * largest:  # rounding is no signal
-        middle = 0.5 * low + 0.5 * high  # of numbers whose sum may not be one
+    if 0.5 * high - 0.5 * low < 0.5e-3 * largest:  # rounding is no signal; of numbers whose difference may not be one
+        middle = 0.5 * low + 0.5 * high
         axes.set_ylim(middle - 0.05 * largest, middle + 0.05 * largest)
     axes.set_ylabel(label)
     axes.grid(color="#dddddd", linewidth=0.6)

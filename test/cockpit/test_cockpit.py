@@ -1058,6 +1058,7 @@ def test_in_the_view_of_a_log_keys_move_the_log_and_not_the_hidden_flight(flying
 
     button(page, "Show the live flight").click()
     page.get_by_text("LIVE", exact=True).first.wait_for(timeout=1e3 * PATIENCE)
+    page.get_by_role("slider").first.wait_for(timeout=1e3 * PATIENCE)
     page.keyboard.press("y")
     made.client.next("events", lambda event: event.kind == FlightEvent.SWASHPLATE)
     page.get_by_role("tab", name="Logs").click()

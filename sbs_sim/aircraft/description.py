@@ -518,6 +518,14 @@ class Rotor(ByContent):
     duct_expansion: float = number(
         "Wake expansion ratio of the duct; 0.5 is an open rotor", 0.25, 2, symbol="a_w", model_field="duct_expansion"
     )
+    induced_power_factor: float = number(
+        "Induced velocity at the blades over that of momentum theory: 1.1 to 1.2 for the tip loss and the uneven inflow"
+        " of a real rotor, 1 for the ideal one",
+        1,
+        2,
+        symbol=r"\kappa_i",
+        default=1.0,
+    )
     collective_range: Range = interval("Range of the collective of the swashplate", -90, 90, "deg", is_physics=False)
     cyclic_range: Range = interval("Range of each cyclic of the swashplate", -90, 90, "deg", is_physics=False)
     swashplate_rate: float = number(

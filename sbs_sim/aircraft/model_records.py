@@ -150,7 +150,7 @@ def _blade_values(
         "lag_damping": factor * rotor.lag_damping,
         "damper_damping": factor * rotor.damper_damping,
         "rotor_speed": _kept_speed(aircraft, rotor),
-        "inflow_speed": rotor.speed,
+        "inflow_speed": rotor.induced_power_factor * rotor.speed,
         "axes": hub_axes(rotor.shaft_direction),
         "lag_hinge_offset": rotor.hinge_offset - rotor.flap_hinge_offset,
         "first_moment": rotor.first_moment,

@@ -94,6 +94,7 @@ class MomentumRotor:
         rotor = aircraft.rotors[j]
         self.speed, self.sense = rotor.speed, rotor.rotation
         self.rigging = aircraft.trim_rigging[3 * j : 3 * j + 3]
+        self._power_factor = rotor.induced_power_factor
         self.tip_speed, self.area = rotor.speed * rotor.radius, math.pi * rotor.radius**2
         self._axes = model.rotors["axes"][j, :, :, 0]
         self.upward = max(0.0, float(self._axes[2, 2]))
@@ -179,6 +180,8 @@ class MomentumRotor:
         """What goes with a thrust and cyclic angles; below `least` the inflow is linear in the thrust."""
         size = math.copysign(max(abs(thrust), least), thrust)
         v, v_slope = self.induced(size)
+        inflow = v / self.tip_speed
+        v, v_slope = self._power_factor * v, self._power_factor * v_slope  # what the blades meet
         through, omega = v * thrust / size + self._axial, self.speed
         pitch, pitch_slope = self._pitch(thrust, through, v_slope)
         coning, coning_slope = self._coning(pitch, pitch_slope, through, v_slope)
@@ -199,7 +202,6 @@ class MomentumRotor:
         )
         collective = pitch + self._pitch_flap * coning
         lag = (torque + self._lag_rest) / self._lag_stiffness if self._lag_stiffness > 0.0 else 0.0
-        inflow = v / self.tip_speed
         return Response(thrust, collective, by_collective, (coning, -aft, -side), lag, inflow, factors, slopes)
 
     def _pitch(self, thrust: float, through: float, v_slope: float) -> tuple[float, float]:
@@ -212,7 +214,8 @@ class MomentumRotor:
 
     def attached(self, thrust: float, inflow: float) -> float:
         """Pitch at the blade's root [rad] that the thrust needs with an inflow ratio, were no section stalled."""
-        return self._pitch(thrust, inflow * self.tip_speed + self._axial, 0.0)[0]
+        induced = self._power_factor * (inflow * self.tip_speed)
+        return self._pitch(thrust, induced + self._axial, 0.0)[0]
 
     def mean_lift(self, thrust: float) -> float:
         """Mean lift coefficient of the sections, by the square of their velocity along the disc."""

@@ -136,7 +136,7 @@ def inflow_cells(rings: int, sectors: int) -> tuple[Array, Array]:
 
 
 def inflow_velocity(rotor: Rotor, inflow: Array, radius: Array, azimuth: Array) -> Array:
-    """Induced velocity down through the disc [m/s] (theory.md section 4, Inflow.msg).
+    """Induced velocity down through the disc [m/s] (theory.md section 4.2, Inflow.msg).
 
     Parameters
     ----------
@@ -147,4 +147,5 @@ def inflow_velocity(rotor: Rotor, inflow: Array, radius: Array, azimuth: Array) 
         Over R, and in rad.
     """
     uniform, sine, cosine = inflow
-    return rotor.speed * rotor.radius * (uniform + radius * (sine * np.sin(azimuth) + cosine * np.cos(azimuth)))
+    speed = rotor.induced_power_factor * rotor.speed
+    return speed * rotor.radius * (uniform + radius * (sine * np.sin(azimuth) + cosine * np.cos(azimuth)))

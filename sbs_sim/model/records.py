@@ -68,7 +68,7 @@ ROTOR = {
 }
 BLADE = {
     "rotor_speed": LANES,
-    "inflow_speed": LANES,
+    "inflow_speed": LANES,  # kappa_i Omega of the file
     "sense": LANES,
     "radius": LANES,
     "hub": VECTOR,

@@ -340,6 +340,7 @@ OTHER_VALUES = {
     ("rotors", 0, "blade_inertia"): 0.0123,
     ("rotors", 0, "blade_lag_damping"): [1.0, 0.0, 1.0],
     ("rotors", 0, "flap_rest_deg"): 2.0,
+    ("rotors", 0, "induced_power_factor"): 1.15,
     ("rotors", 0, "lag_rest_deg"): -7.0,
     ("options", "elements"): 21,
 }
@@ -349,6 +350,7 @@ OPTIONAL = {
     "swashplate_offset_deg",
     "blade_inertia",
     "flap_rest_deg",
+    "induced_power_factor",
     "lag_rest_deg",
     "blade_lag_damping",
     "lag_damper",

@@ -48,6 +48,7 @@ ODD_BLADE = {
     "root_cutout": 0.03,
     "tip_loss": 0.96,
     "duct_expansion": 0.8,
+    "induced_power_factor": 1.17,
 }
 TILTED = [{"shaft_direction": unit(0.1, -0.2, -1.0)}, {"shaft_direction": unit(-0.15, 0.3, -0.9)}]
 TAIL_ROTOR = {

@@ -39,7 +39,7 @@ def reversed_flow(rng, x, swash):
 def aircraft_of(name):
     """Aircraft without what the plain kernel leaves out; `plain_model` has it."""
     values = copy.deepcopy(AIRCRAFT[name])
-    for key in ("blade_inertia", "lag_damper", "flap_rest_deg", "lag_rest_deg"):
+    for key in ("blade_inertia", "lag_damper", "flap_rest_deg", "lag_rest_deg", "induced_power_factor"):
         values.get("every_rotor", {}).pop(key, None)
     return build(**values)
 

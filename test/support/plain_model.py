@@ -310,6 +310,11 @@ def speed_rate(rotor):
     return getattr(rotor, "speed_rate", 0.0)
 
 
+def blade_inflow_speed(rotor):
+    """Scale of the inflow that the blades meet, which is more than momentum theory says."""
+    return rotor.induced_power_factor * inflow_speed(rotor)
+
+
 def inflow_speed(rotor):
     """Return the speed that makes velocities of inflow ratios [rad/s], where it is not that of the rotor."""
     return getattr(rotor, "inflow_speed", rotor.speed)
@@ -461,7 +466,7 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
         pitch = hinge_pitch(blade, swash)[0] + along_blade(rotor, "twist", s)
         velocity = blade.velocity(s, air_velocity_hub)
         cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
-        induced = inflow_speed(rotor) * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
+        induced = blade_inflow_speed(rotor) * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
         u_t = velocity @ blade.t
         u_p = velocity @ blade.n + induced * np.cos(blade.flap)
         # The section sees the flow across the span only: |V| is the speed in the plane of t and n.
@@ -1025,6 +1030,7 @@ def table6_aircraft(environment=None, body=None, options=None, rotors=None):
         "swashplate_phase": np.radians(-72.0),
         "airfoil": "smooth",
         "duct_expansion": 0.5,
+        "induced_power_factor": 1.0,
     }
     each = [
         {**rotor, "name": "MR1", "hub": np.array([0.0, -0.645, 0.066]), "rotation": -1},

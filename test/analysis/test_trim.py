@@ -152,7 +152,7 @@ def test_momentum_theory_in_axial_flight(sbs, climb):
 
 @pytest.mark.parametrize(("climb", "factor"), [(0.0, 1.0), (5.0, 1.0), (0.0, 1.15), (5.0, 1.15)])
 def test_power_in_axial_flight_is_induced_climb_and_profile(tmp_path, climb, factor):
-    """P = T (kappa_i v + V_c) + 3 Int 1/2 rho c cd |V|^3 dr with a constant cd; flap and lag of 1 deg change it by 0.1 %.
+    """P = T (kappa_i v + V_c) + 3 Int 1/2 rho c cd |V|^3 dr, constant cd; flap and lag of 1 deg change it by 0.1 %.
 
     Every section's drag dissipates D |V|, and uniform inflow takes T kappa_i v, v by momentum theory (energy balance of
     the blade elements).

@@ -466,7 +466,9 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
         pitch = hinge_pitch(blade, swash)[0] + along_blade(rotor, "twist", s)
         velocity = blade.velocity(s, air_velocity_hub)
         cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
-        induced = blade_inflow_speed(rotor) * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
+        induced = (
+            blade_inflow_speed(rotor) * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
+        )
         u_t = velocity @ blade.t
         u_p = velocity @ blade.n + induced * np.cos(blade.flap)
         # The section sees the flow across the span only: |V| is the speed in the plane of t and n.

@@ -331,6 +331,14 @@ def test_goettingen429_has_the_published_slope_and_mean_drag():
     assert interpolate(table, 2e6, math.pi / 2)[1] == pytest.approx(1.11 + 0.018 * 14.6, abs=1e-9)
 
 
+def test_naca0015_lifts_as_castles_and_gray_measured():
+    """NACA TN 2474: slopes of 5.9 and 6.07 /rad at Mach 0.248 and 0.33; Prandtl and Glauert take them to Mach 0."""
+    table = read_table(AIRFOILS / "naca0015.csv", 10.0)
+    for reynolds, mach, measured in [(256e3, 0.248, 5.9), (341e3, 0.33, 6.07)]:
+        assert slope(table, reynolds, 8.0) == pytest.approx(measured * math.sqrt(1 - mach**2), rel=0.03)
+    np.testing.assert_array_equal(table.cl, -table.cl[:, ::-1])
+
+
 # --- Look-up --------------------------------------------------------------------------------------
 
 

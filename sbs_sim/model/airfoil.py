@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +35,7 @@ MIN_STEP_DEG, MAX_STEP_DEG = 0.01, 10.0
 MAX_FAR_STEP_DEG, FAR_DEG = 45.0, 30.0  # between angles of which one is beyond FAR_DEG
 STEP_TOLERANCE = 0.01  # of a step, for angles that were rounded in the file
 FINEST_DEG, ROUNDING_DEG = 0.05, 0.001  # of the common step of uneven angles
+MAX_HALF = round(180 / FINEST_DEG)
 ATTACHED = math.radians(5.0)  # from the angle of no lift: so far the flow is taken to be attached
 SEPARATED = 0.5  # of the lift of attached flow: below, the flow has left the section
 
@@ -427,7 +429,39 @@ INTERPOLATIONS = ("smooth", "linear")
 DEGREE = 3  # of the polynomials along the angle
 
 
-def cells(table: AirfoilTable, interpolation: str) -> Array:
+class Grid(NamedTuple):
+    """Grid of cells of one or several tables.
+
+    Attributes
+    ----------
+    half : int
+        Cells in 180 deg.
+    knots : tuple of float
+        Reynolds or Mach numbers, at least two.
+    range : (float, float)
+        Least and largest number for which any of the tables holds.
+    """
+
+    half: int
+    knots: tuple[float, ...]
+    range: tuple[float, float]
+
+
+def common_half(tables: Sequence[AirfoilTable]) -> int:
+    """Steps in 180 deg of the coarsest even grid that has all angles of some tables."""
+    return math.lcm(*(table.half for table in tables))
+
+
+def common_grid(tables: Sequence[AirfoilTable]) -> Grid:
+    """Grid that has all angles and all Reynolds or Mach numbers of some tables."""
+    several = [table for table in tables if len(table.numbers) > 1]
+    if not several:
+        return Grid(common_half(tables), tuple(tables[0].knots), tables[0].range)
+    knots = np.unique(np.concatenate([table.numbers for table in several]))
+    return Grid(common_half(tables), tuple(knots), (float(knots[0]), float(knots[-1])))
+
+
+def cells(table: AirfoilTable, interpolation: str, grid: Grid | None = None) -> Array:
     """Coefficients of the interpolation in every cell of a table, for `sbs_sim.model.section`.
 
     Along the angle "smooth" is the monotone cubic of Fritsch and Carlson: its slope is continuous, and it rises or
@@ -442,10 +476,12 @@ def cells(table: AirfoilTable, interpolation: str) -> Array:
     table : AirfoilTable
     interpolation : str
         One of `INTERPOLATIONS`.
+    grid : Grid, optional
+        One that has all points of the table; its own if not given. Beyond its own numbers a table is constant.
 
     Returns
     -------
-    ndarray, shape ((len(table.knots) - 1) * cell_grid(table)[0], 16)
+    ndarray, shape ((len(grid.knots) - 1) * cell_grid(grid)[0], 16)
         c_00, c_01, c_02, c_03, c_10 ... of each cell. The angle runs fastest and covers -540..540 deg, so that a
         section angle minus an arctangent, -3 pi..3 pi, needs no wrapping.
 
@@ -453,16 +489,31 @@ def cells(table: AirfoilTable, interpolation: str) -> Array:
     ----------
     F. N. Fritsch, R. E. Carlson: Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17 (2), 1980.
     """
+    grid = common_grid([table]) if grid is None else grid
     lower, width, steps = table.knots[:-1, None], np.diff(table.knots)[:, None], table.intervals
+    finer = steps * (grid.half // table.half)
     parts = []
     for values in (table.cl, table.cd):
         powers = _polynomials(np.repeat(values, 2, axis=0) if len(values) == 1 else values, steps, interpolation)
-        if steps.max() > 1.0:
-            powers = _cut(powers, steps.astype(np.int64))
+        if finer.max() > 1.0:
+            powers = _cut(powers, finer.astype(np.int64))
         slope = np.diff(powers, axis=1) / width
-        parts += [powers[:, :-1] - lower * slope, slope]
+        parts += _between(table, np.array(grid.knots), powers, powers[:, :-1] - lower * slope, slope)
     rows = np.stack(parts, axis=-1).transpose(1, 2, 0, 3)
     return np.ascontiguousarray(np.tile(rows, (1, TURNS, 1, 1)).reshape(-1, 4 * (DEGREE + 1)))
+
+
+def _between(table: AirfoilTable, knots: Array, powers: Array, level: Array, slope: Array) -> list[Array]:
+    """Lines over the table's numbers as lines between other knots, which have all of them; constant beyond the ends."""
+    if np.array_equal(knots, table.knots) or len(table.numbers) == 1:
+        rows = np.zeros(len(knots) - 1, np.int64) if len(table.numbers) == 1 else slice(None)
+        return [level[:, rows], slope[:, rows]]
+    middles = 0.5 * (knots[1:] + knots[:-1])
+    rows = np.clip(np.searchsorted(table.numbers, middles) - 1, 0, len(table.numbers) - 2)
+    level, slope = level[:, rows], slope[:, rows]
+    for beyond, row in ((middles < table.numbers[0], 0), (middles > table.numbers[-1], -1)):
+        level[:, beyond], slope[:, beyond] = powers[:, row : row + 1 or None], 0.0
+    return [level, slope]
 
 
 def _polynomials(values: Array, steps: Array, interpolation: str) -> Array:
@@ -517,7 +568,7 @@ def _monotone_slopes(rise: Array, steps: Array) -> Array:
     return np.where(before * rise > 0.0, limited, 0.0)
 
 
-def cell_grid(table: AirfoilTable) -> tuple[int, float, float]:
+def cell_grid(table: AirfoilTable | Grid) -> tuple[int, float, float]:
     """Angle grid of `cells`.
 
     Returns

@@ -17,6 +17,8 @@ from sbs_sim.model.airfoil import (
     AirfoilTable,
     cell_grid,
     cells,
+    common_grid,
+    common_half,
     extend_polar,
     interpolate,
     read_table,
@@ -39,7 +41,7 @@ DEG = math.pi / 180
 def _look_up(like, blades, knots, table, given, out):
     blade = as_records(blades)[0]
     values, found = as_lanes(given, as_records(like)), as_lanes(out, as_records(like))
-    cell = table_cell(blade, as_lanes(knots, blade), values[0], values[1])
+    cell = table_cell(blade, 3.0, as_lanes(knots, blade), values[0], values[1])
     lift, lift_slope, drag, drag_slope = table_row(table, cell.row, cell.fraction, DEGREE)
     found[0], found[1] = lift + lift_slope * cell.number, drag + drag_slope * cell.number
     found[2], found[3] = cell.row, cell.fraction
@@ -60,7 +62,6 @@ class Reader:
             "first_alpha": first_angle,
             "inverse_alpha_step": inverse_step,
             "alpha_cells": columns,
-            "first_row": 3.0,
         }
         values |= {"min_number": table.numbers[0], "max_number": table.numbers[-1]}
         for name, value in values.items():
@@ -537,6 +538,26 @@ def test_a_table_without_numbers_is_read(tmp_path):
     table = read_table(write_csv(tmp_path, "-5,-0.5,0.02", "0,0,0.01", "5,0.5,0.02", header="alpha_deg,cl,cd"), 10.0)
     assert table.range == (0.0, math.inf)
     assert interpolate(table, 1e5, 5 * DEG)[0] == pytest.approx(0.5, abs=1e-12)
+
+
+@pytest.mark.parametrize("interpolation", ["smooth", "linear"])
+def test_tables_on_a_common_grid_have_their_own_values(interpolation):
+    """What a table gives on the grid of several is what it gives on its own, and constant beyond its own numbers."""
+    tables = uneven_table(), TABLES["linear_573"], uneven_table(np.array([0.1, 0.6])), uneven_table(np.array([0.4]))
+    grid = common_grid([tables[0], *tables[2:]])
+    assert grid == (360, (0.0, 0.1, 0.3, 0.5, 0.6, 0.75), (0.0, 0.75))
+    width = np.pi / grid.half
+    for table in (tables[0], *tables[2:]):
+        rows = cells(table, interpolation, grid).reshape(len(grid.knots) - 1, -1, 4, 4)
+        for i, mach in enumerate([0.05, 0.2, 0.4, 0.55, 0.7]):
+            for alpha in (-2.0, -0.21, 0.137, 3.0):
+                column = int((alpha + np.pi) / width)
+                powers = ((alpha + np.pi) / width - column) ** np.arange(4)
+                lift, lift_slope, drag, drag_slope = powers @ rows[i, column]
+                expected = interpolate(table, mach, alpha, interpolation)
+                assert (lift + lift_slope * mach, drag + drag_slope * mach) == pytest.approx(expected, abs=1e-11)
+    assert common_grid([tables[0]]).half == 360
+    assert common_half(tables[:2]) == 360
 
 
 def test_stall_angles_of_uneven_tables_are_those_of_the_points():

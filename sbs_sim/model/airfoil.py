@@ -89,16 +89,17 @@ class AirfoilTable(ByContent):
 
 
 def half_turn(alpha: Array) -> int:
-    """Steps in 180 deg of the coarsest even grid that has all angles [rad]; 0 if its step were below `FINEST_DEG`.
+    """Steps in 180 deg of the coarsest even grid that has all angles [rad]; 0 if there is none.
 
-    Even angles that were rounded may be off by a hundredth of their step, uneven ones by a thousandth of a degree.
+    Uneven angles must be multiples of `FINEST_DEG`. Even ones that were rounded may be off by a hundredth of their
+    step, uneven ones by a thousandth of a degree.
     """
     angles = np.degrees(alpha)
     step = (angles[-1] - angles[0]) / (len(angles) - 1)
     half = max(1, round(float(180 / step)))
     if np.all(np.abs(np.diff(angles) - step) <= STEP_TOLERANCE * step) and _are_multiples(angles, half, STEP_TOLERANCE):
         return half
-    for half in range(1, round(180 / FINEST_DEG) + 1):
+    for half in (number for number in range(1, MAX_HALF + 1) if MAX_HALF % number == 0):
         if _are_multiples(angles, half, ROUNDING_DEG / 180 * half):
             return half
     return 0
@@ -222,11 +223,8 @@ def extend_polar(alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: f
         From -pi to pi, beyond the given angles with the common step of these; cl and cd are equal at both ends.
     """
     alpha, cl, cd = (np.asarray(values, dtype=np.float64) for values in (alpha, cl, cd))
-    half = half_turn(alpha)
-    circle = np.arange(-half, half + 1) * (np.pi / half)
-    kept = half + np.rint(alpha / np.pi * half).astype(np.int64)
-    circle = np.concatenate([circle[: kept[0]], circle[kept], circle[kept[-1] + 1 :]])
-    first, last = kept[0], kept[0] + len(alpha) - 1
+    circle, first = circle_of(alpha)
+    last = first + len(alpha) - 1
     low, high = -circle[first], circle[last]
     below = viterna(circle[:first], low, -cl[0], cd[0], aspect_ratio)
     above = viterna(circle[last + 1 :], high, cl[-1], cd[-1], aspect_ratio)
@@ -239,14 +237,22 @@ def extend_polar(alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: f
     return np.asarray(circle, np.float64), circle_cl, circle_cd
 
 
+def circle_of(alpha: Array) -> tuple[Array, int]:
+    """Angles from -pi to pi [rad], beyond given ones with their common step, and the index of the first given one."""
+    half = half_turn(alpha)
+    circle = np.arange(-half, half + 1) * (np.pi / half)
+    kept = half + np.rint(alpha / np.pi * half).astype(np.int64)
+    return np.concatenate([circle[: kept[0]], circle[kept], circle[kept[-1] + 1 :]]), int(kept[0])
+
+
 def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
     """Read an airfoil table from a CSV file.
 
     The file has the header `reynolds,alpha_deg,cl,cd` or `mach,alpha_deg,cl,cd` and a full grid: one block of rows for
     each Reynolds or Mach number, in increasing order, each with the same angles; or the header `alpha_deg,cl,cd` and
     one block, for all numbers. Lines that begin with '#' are comments. The angles run from -180 to 180 deg, or over an
-    attached range around zero that `extend_polar` completes. They are multiples of one step, 0.05 deg or more if they
-    are uneven.
+    attached range around zero that `extend_polar` completes. They are even in a step that divides 180 deg, or multiples
+    of 0.05 deg.
 
     Parameters
     ----------
@@ -265,7 +271,12 @@ def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
         With one line: file, line, column, the value and what is allowed.
     """
     path = Path(path)
-    columns, values, lines = _read_rows(path)
+    return parse_table(path, read_text(path), aspect_ratio)
+
+
+def parse_table(path: Path, text: str, aspect_ratio: float) -> AirfoilTable:
+    """Airfoil table of the text of a file, see `read_table`; the path is for its name and for messages."""
+    columns, values, lines = parse_rows(path, text)
     axis = columns[0] if columns[0] in AXES else AXES[0]
     blocks = _split_blocks(path, axis, values, lines)
     half = _check_angles(path, axis, values, lines, blocks)
@@ -282,14 +293,24 @@ def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
     return AirfoilTable(path.stem, numbers, circle[0], circle_cl, circle_cd, (float(alpha[0]), float(alpha[-1])), axis)
 
 
-def _read_rows(path: Path) -> tuple[tuple[str, ...], Array, list[int]]:
-    """Columns of the file, all rows as numbers, shape (n, 4), and the line number of each."""
+def read_text(path: Path) -> str:
+    """Text of a file.
+
+    Raises
+    ------
+    AirfoilError
+        It cannot be read, or is no text.
+    """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise AirfoilError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise AirfoilError(f"{path}: byte {error.start} is not UTF-8 text") from error
+
+
+def parse_rows(path: Path, text: str) -> tuple[tuple[str, ...], Array, list[int]]:
+    """Columns of a CSV file, all rows as numbers, shape (n, 4), and the line number of each."""
     content = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1)]
     content = [(i, line) for i, line in content if line and not line.startswith("#")]
     if not content:
@@ -371,7 +392,7 @@ def _check_angles(path: Path, axis: str, values: Array, lines: list[int], blocks
         return half
     found = [half_turn(np.radians(angles[:i])) for i in range(2, len(angles) + 1)]
     i = found.index(0) + 1  # the first that does not fit to those above
-    allowed = f"a multiple of a step that divides 180, that all angles have, and that is {FINEST_DEG:g} or more"
+    allowed = f"a multiple of {FINEST_DEG:g}, as angles that are uneven or whose step does not divide 180"
     raise _bad(path, lines[i], "alpha_deg", angles[i], allowed)
 
 
@@ -406,23 +427,30 @@ def _check_ends(path: Path, lines: list[int], blocks: list[slice], cl: Array, cd
 
 
 def write_table(path: str | Path, table: AirfoilTable, comments: Sequence[str] = ()) -> None:
-    """Write a table in the format of `read_table`, coefficients rounded to six decimals.
+    """Write a table in the format of `read_table`, coefficients rounded to six decimals."""
+    Path(path).write_text(table_text(table, comments), encoding="utf-8")
+
+
+def table_text(table: AirfoilTable, comments: Sequence[str] = ()) -> str:
+    """Text of a table in the format of `read_table`, coefficients rounded to six decimals.
 
     Parameters
     ----------
-    path : str or Path
     table : AirfoilTable
+        One that ends at stall may have the given angles only.
     comments : sequence of str
         Lines on the table's origin, written on top behind '# '.
     """
     angles = np.rint(table.alpha / np.pi * table.half) * 180 / table.half
-    lines = [f"# {comment}".rstrip() for comment in comments] + [",".join((table.axis, *POLAR_COLUMNS))]
+    is_for_all = len(table.numbers) == 1 and table.numbers[0] == 0.0
+    columns = POLAR_COLUMNS if is_for_all else (table.axis, *POLAR_COLUMNS)
+    lines = [f"# {comment}".rstrip() for comment in comments] + [",".join(columns)]
     for i, number in enumerate(table.numbers):
         for j, angle in enumerate(angles):
             # Adding zero turns a rounded -0 into 0.
             cl, cd = round(table.cl[i, j], 6) + 0.0, round(table.cd[i, j], 6)
-            lines.append(f"{number:.10g},{angle:.10g},{cl:.6f},{cd:.6f}")
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+            lines.append(f"{'' if is_for_all else f'{number:.10g},'}{angle:.10g},{cl:.6f},{cd:.6f}")
+    return "\n".join(lines) + "\n"
 
 
 INTERPOLATIONS = ("smooth", "linear")

@@ -654,8 +654,7 @@ BAD_ROWS = {
     ),
     "uneven without a common step": (
         [*block(1e5, [-10, -5, 1.002, 2]), *block(2e5, [-10, -5, 1.002, 2])],
-        "5: alpha_deg 1.002 must be a multiple of a step that divides 180, that all angles have, and that is 0.05"
-        " or more",
+        "5: alpha_deg 1.002 must be a multiple of 0.05, as angles that are uneven or whose step does not divide 180",
     ),
     "coarse beside 30 deg": (
         [*block(1e5, [-40, -20, 0, 10]), *block(2e5, [-40, -20, 0, 10])],

@@ -21,7 +21,7 @@ _sbs_sim_options() {
         'validate') echo '--help --version --list --json --page --strict' ;;
         'gusts') echo '--help --version --aircraft --set --wind --turbulence --length --gust --gust-duration --seed --duration --delay --limit --json' ;;
         'plot') echo '--help --version --out --flight' ;;
-        'airfoil') echo '--help --version --out --extend --aspect-ratio --reynolds' ;;
+        'airfoil') echo '--help --version --out --extend --aspect-ratio --over --reynolds' ;;
         'aircraft') echo '--help --version --aircraft --set --out' ;;
     esac
 }
@@ -35,6 +35,7 @@ _sbs_sim_follows() {
         'linearize --method') echo 'averaged paper' ;;
         'sweep') echo '@paths' ;;
         'airfoil --extend') echo 'viterna montgomerie plate hold none' ;;
+        'airfoil --over') echo 'reynolds mach' ;;
     esac
 }
 

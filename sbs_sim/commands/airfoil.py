@@ -8,7 +8,6 @@ from sbs_sim.commands.common import UsageError, execute, print_table
 from sbs_sim.terminal.command_line import Parser
 
 if TYPE_CHECKING:
-    from sbs_sim.aircraft.airfoil_files import AirfoilData
     from sbs_sim.model.airfoil import AirfoilTable
 
 EXTENSIONS = ("viterna", "montgomerie", "plate", "hold", "none")
@@ -29,7 +28,7 @@ def make_parser() -> Parser:
         description="Read airfoil data, say what is in it, and write it as a table that aircraft files take (CSV), or"
         " as a C81 table. Several files are polars of one airfoil at several Reynolds or at several Mach numbers.",
     )
-    parser.add_argument("file", nargs="+", type=Path, help="C81, XFOIL or XFLR5 polar, AeroDyn 15 airfoil file, or CSV")
+    parser.add_argument("file", nargs="+", type=Path, help="C81 table, XFOIL or XFLR5 polar, AeroDyn file, or CSV")
     parser.add_argument("--out", type=Path, metavar="FILE", help=".csv or .c81 to write (default: none)")
     parser.add_argument(
         "--extend",
@@ -46,28 +45,35 @@ def make_parser() -> Parser:
         help="length of the blade over its chord, for the extension (default: 10)",
     )
     parser.add_argument(
+        "--over",
+        choices=("reynolds", "mach"),
+        help="what the table is over, where both numbers vary from file to file (default: the one that varies)",
+    )
+    parser.add_argument(
         "--reynolds", type=float, metavar="X", help="take the table at this Reynolds number only, as C81 tables need it"
     )
     return parser
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.aircraft.airfoil_files import at_reynolds, read_airfoil, table_of
+    from sbs_sim.aircraft.airfoil_files import import_airfoil
+    from sbs_sim.aircraft.airfoil_files.table import at_reynolds
     from sbs_sim.output.files import check_target, write
 
     if not 0.0 < arguments.aspect_ratio < float("inf"):
         raise UsageError(f"--aspect-ratio {arguments.aspect_ratio:g}: allowed is a number greater than 0")
     check_target(arguments.out, SUFFIXES)
-    data = [read_airfoil(path) for path in arguments.file]
-    name = arguments.out.stem if arguments.out else arguments.file[0].stem
-    extension = None if arguments.extend == "none" else arguments.extend
-    polars = [polar for one in data for polar in one.polars]
-    table, remarks = table_of(name, polars, extension, arguments.aspect_ratio)
+    table, airfoil, notes = import_airfoil(
+        arguments.file,
+        arguments.out.stem if arguments.out else "",
+        extension=None if arguments.extend == "none" else arguments.extend,
+        aspect_ratio=arguments.aspect_ratio,
+        axis=arguments.over,
+    )
     if arguments.reynolds is not None:
         table = at_reynolds(table, arguments.reynolds)
-        remarks.append(f"taken at Reynolds number {arguments.reynolds:g}")
-    notes = [*(_source(path, one) for path, one in zip(arguments.file, data, strict=True)), *remarks]
-    text = _text(table, data[0].name, arguments, notes) if arguments.out else None
+        notes.append(f"taken at Reynolds number {arguments.reynolds:g}")
+    text = _text(table, airfoil, arguments, notes) if arguments.out else None
     print("\n".join(notes))
     _print_summary(table)
     if text is not None:
@@ -75,24 +81,21 @@ def _work(arguments: argparse.Namespace) -> None:
         print(f"written: {arguments.out}")
 
 
-def _source(path: Path, data: "AirfoilData") -> str:
-    from sbs_sim.aircraft.airfoil_files import plain
-
-    more = "".join(f"; {remark}" for remark in data.remarks)
-    return f"{plain(path.name)}: {data.kind} of {plain(data.name)}, {len(data.polars)} polars{more}"
-
-
 def _text(table: "AirfoilTable", name: str, arguments: argparse.Namespace, notes: list[str]) -> str:
     """Content of the file to write, which can be read; adds to the notes what is lost in it."""
-    from sbs_sim.aircraft.airfoil_files import c81_text
+    from sbs_sim.aircraft.airfoil_files.c81 import c81_text
+    from sbs_sim.errors import AirfoilError
     from sbs_sim.model.airfoil import parse_table, table_text
 
     if arguments.out.suffix.lower() == ".c81":
-        text, error = c81_text(table, name)
-        notes.append(f"lift between the angles of the C81 table is off by at most {error:.2g}")
+        text, (lift, drag) = c81_text(table, name)
+        notes.append(f"between the angles of the C81 table lift is off by up to {lift:.2g}, drag by up to {drag:.2g}")
         return text
     text = table_text(table, ["Made by `sbs-sim airfoil`.", *notes])
-    parse_table(arguments.out, text, arguments.aspect_ratio)
+    try:
+        parse_table(arguments.out, text, arguments.aspect_ratio)
+    except AirfoilError as error:
+        raise AirfoilError(f"not written, for no aircraft could read it: {error}") from None
     return text
 
 

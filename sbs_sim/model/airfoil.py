@@ -36,6 +36,7 @@ MAX_FAR_STEP_DEG, FAR_DEG = 45.0, 30.0  # between angles of which one is beyond 
 STEP_TOLERANCE = 0.01  # of a step, for angles that were rounded in the file
 FINEST_DEG, ROUNDING_DEG = 0.05, 0.001  # of the common step of uneven angles
 MAX_HALF = round(180 / FINEST_DEG)
+MAX_BYTES = 20_000_000  # of a file: a table of 0.05 deg has a quarter of a megabyte for each number
 ATTACHED = math.radians(5.0)  # from the angle of no lift: so far the flow is taken to be attached
 SEPARATED = 0.5  # of the lift of attached flow: below, the flow has left the section
 
@@ -293,16 +294,20 @@ def parse_table(path: Path, text: str, aspect_ratio: float) -> AirfoilTable:
     return AirfoilTable(path.stem, numbers, circle[0], circle_cl, circle_cd, (float(alpha[0]), float(alpha[-1])), axis)
 
 
-def read_text(path: Path) -> str:
-    """Text of a file.
+def read_text(path: Path, errors: str = "strict") -> str:
+    """Text of a file of at most `MAX_BYTES`; bytes that are no UTF-8 are treated as `bytes.decode` does with `errors`.
 
     Raises
     ------
     AirfoilError
-        It cannot be read, or is no text.
+        It cannot be read, is too long, or is no text.
     """
     try:
-        return path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+        if len(content) > MAX_BYTES:
+            raise AirfoilError(f"{path}: the file has more than {MAX_BYTES} bytes, allowed for airfoil tables")
+        return content.decode("utf-8-sig", errors)
     except OSError as error:
         raise AirfoilError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sbs_sim.aircraft.airfoil_extension import METHODS, broadside_drag
-from sbs_sim.aircraft.airfoil_files import at_reynolds, c81_text, read_airfoil, table_of
+from sbs_sim.aircraft.airfoil_files import import_airfoil, read_airfoil
+from sbs_sim.aircraft.airfoil_files.c81 import c81_text
+from sbs_sim.aircraft.airfoil_files.extension import METHODS, broadside_drag
+from sbs_sim.aircraft.airfoil_files.table import at_reynolds, table_of
 from sbs_sim.errors import AirfoilError
 from sbs_sim.model.airfoil import interpolate, read_table
 
@@ -98,10 +100,10 @@ def test_c81_is_read_by_columns_and_lift_and_drag_are_joined(tmp_path):
     assert [polar.numbers["mach"] for polar in data.polars] == pytest.approx([0.1 * k for k in range(10)])
     table, _ = table_of("wing", data.polars, "viterna", 10.0)
     assert table.axis == "mach"
-    np.testing.assert_allclose(table.alpha / DEG, [-180, -90, 0, 90, 180], atol=1e-9)
-    np.testing.assert_allclose(table.cl[:9, 2], [-0.25 - 0.01 * k for k in range(9)], atol=1e-12)
-    np.testing.assert_allclose(table.cl[4, 1], -0.5 * (0.04 + 0.29), atol=1e-12)  # between -180 and 0 deg
-    np.testing.assert_allclose(table.cd[:, 2], 1.5 * (1 + np.arange(10) / 9), atol=1e-12)  # between both in both
+    np.testing.assert_allclose(table.alpha / DEG, np.arange(-180, 181, 10), atol=1e-9)  # the wide gaps are filled
+    np.testing.assert_allclose(table.cl[:9, 18], [-0.25 - 0.01 * k for k in range(9)], atol=1e-12)
+    np.testing.assert_allclose(table.cl[4, 9], -0.5 * (0.04 + 0.29), atol=1e-12)  # between -180 and 0 deg
+    np.testing.assert_allclose(table.cd[:, 18], 1.5 * (1 + np.arange(10) / 9), atol=1e-12)  # between both in both
 
 
 def test_xfoil_polars_at_several_reynolds_numbers_are_extended_each_from_its_own_end(tmp_path):
@@ -135,8 +137,80 @@ def test_aerodyn_tables_have_reynolds_numbers_in_millions_and_angles_without_a_c
     assert interpolate(table, 1.5e6, -12 * DEG) == pytest.approx((-1.0, 0.03), abs=1e-9)
     # -12.01 deg is moved to -12, on the line to 0 deg
     assert interpolate(table, 0.75e6, -12 * DEG)[0] == pytest.approx(-0.953 + 0.01 / 12.01 * 1.474, abs=1e-9)
-    assert any("moved to multiples of 0.1 deg by at most 0.01 deg" in remark for remark in remarks)
-    assert any("differed by up to 0.01: the mean is taken" in remark for remark in remarks)
+    assert any("moved to multiples of 0.1 deg by at most 0.01 deg, which" in remark for remark in remarks)
+    assert any("differ by up to 0.01: the mean is taken" in remark for remark in remarks)
+
+
+def test_polars_behind_one_another_in_one_file_are_all_read(tmp_path):
+    texts = [xfoil(tmp_path, reynolds, 10).read_text() for reynolds in (1e6, 2e5, 5e5)]
+    data = read_airfoil(write(tmp_path, "all.txt", "\n".join(texts)))
+    assert [polar.numbers["reynolds"] for polar in data.polars] == [1e6, 2e5, 5e5]
+    assert [len(polar.alpha) for polar in data.polars] == [19, 19, 19]
+
+
+@pytest.mark.parametrize("number", ["1.500 e 6", "1.500e 6", "1500000", "1.500 e +06"])
+def test_the_reynolds_number_may_be_written_in_several_ways(tmp_path, number):
+    text = xfoil(tmp_path, 1e6, 10).read_text().replace("1.000 e 6", number)
+    (polar,) = read_airfoil(write(tmp_path, "a.txt", text)).polars
+    assert polar.numbers == {"reynolds": 1.5e6, "mach": 0.0}
+
+
+def test_polars_of_airfoiltools(tmp_path):
+    head = "Xfoil polar. Reynolds number fixed. Mach  number fixed\nPolar key,xf-n0012-il-50000\nAirfoil,n0012-il\n"
+    head += "Reynolds number,50000\nNcrit,9\nMach,0\nMax Cl/Cd,37.4\nUrl,http://a.b/c\n\nAlpha,Cl,Cd,Cdp,Cm,Top_Xtr\n"
+    rows = "".join(f"{angle},{0.1 * angle},0.02,0.01,0.0,1.0\n" for angle in (-9.25, 0.0, 9.25))
+    data = read_airfoil(write(tmp_path, "a.csv", head + rows))
+    assert (data.name, data.polars[0].numbers) == ("n0012-il", {"reynolds": 5e4, "mach": 0.0})
+    np.testing.assert_allclose(data.polars[0].cl, [-0.925, 0.0, 0.925])
+
+
+def test_the_table_is_over_the_number_that_is_chosen_where_both_vary(tmp_path):
+    for mach in (0.1, 0.2, 0.3):
+        text = xfoil(tmp_path, 1e7 * mach, 10).read_text().replace("Mach =   0.000", f"Mach =   {mach:.3f}")
+        write(tmp_path, f"{mach}.txt", text)
+    files = [tmp_path / f"{mach}.txt" for mach in (0.3, 0.1, 0.2)]
+    for axis, numbers in (("mach", [0.1, 0.2, 0.3]), ("reynolds", [1e6, 2e6, 3e6])):
+        table, airfoil, remarks = import_airfoil(files, axis=axis)
+        assert (table.name, table.axis, airfoil) == ("0.3", axis, "NACA <b>2412</b>")
+        assert list(table.numbers) == pytest.approx(numbers)
+        assert remarks[0] == "0.3.txt: XFOIL polar of NACA <b>2412</b>, 1 polar"
+
+
+def test_c81_numbers_between_blanks_and_card_numbers_behind_the_columns(tmp_path):
+    """All twelve values of a row in a line, exponents of Fortran, a name that is short, and a deck's card numbers."""
+    mach = " ".join(f"{0.05 * k:.4f}" for k in range(12))
+    rows = [f"{angle} " + " ".join(f"{0.1 * angle + k:.6f}" for k in range(12)) for angle in (-10, 0, 10)]
+    drag = [f"{7 * ' '}{0:7.1f}{0.5:7.1f}".ljust(72) + "C8100001"]
+    drag += [f"{angle:7.1f}  2.D-2 30.D-3".ljust(72) + "C8100002" for angle in (-10, 0, 10)]
+    text = "\n".join(["SHORT 12 3 2 3 0 0", mach, *rows, *drag])
+    data = read_airfoil(write(tmp_path, "a.c81", text))
+    assert len(data.polars) == 12
+    np.testing.assert_allclose([polar.cl[2] for polar in data.polars], 1.0 + np.arange(12))
+    np.testing.assert_allclose([polar.cd[0] for polar in data.polars[::11]], [0.02, 0.03])
+    assert "drag held beyond its Mach numbers 0 to 0.5" in data.remarks
+    other = text.replace(f"{10:7.1f}  2.D-2", f"{9:7.1f}  2.D-2")
+    assert "cut to -10 to 9 deg, which both lift and drag have" in read_airfoil(write(tmp_path, "b.c81", other)).remarks
+
+
+def test_an_old_aerodyn_file_and_a_cylinder_at_three_angles(tmp_path):
+    """The gaps of 180 deg are filled; a section without lift needs no extension."""
+    head = "a file\nof a test\n 1 Number of airfoil tables in this file\n 0.0 Table ID parameter\n 0 No longer used\n"
+    text = head + "-180.00 0.000 0.5000\n 0.00 0.000 0.5000\n 180.00 0.000 0.5000\nEOT\nremarks\n"
+    table, _, remarks = import_airfoil([write(tmp_path, "Cylinder1.dat", text)])
+    assert list(table.numbers) == [0.0]
+    assert (np.abs(table.cl).max(), table.cd.min(), table.cd.max()) == (0.0, 0.5, 0.5)
+    assert "polar: gaps between angles filled on the lines between the points" in remarks
+    assert len(table.alpha) == 37
+
+
+def test_comments_may_have_any_bytes_and_files_are_limited(tmp_path):
+    path = write(tmp_path, "a.dat", AERODYN)
+    path.write_bytes(b"! \xb1180 deg\n" + path.read_bytes())
+    assert len(read_airfoil(path).polars) == 2
+    with path.open("ab") as file:
+        file.truncate(20_000_001)
+    with pytest.raises(AirfoilError, match="more than 20000000 bytes, allowed for airfoil tables"):
+        read_airfoil(path)
 
 
 def test_a_symmetric_polar_is_mirrored(tmp_path):
@@ -150,14 +224,15 @@ def test_c81_tables_come_back(tmp_path, name):
     """Within the four decimals of a C81 table, and what 99 angles lose, which the writer tells."""
     table = read_table(AIRFOILS / f"{name}.csv", 10.0)
     one = table if table.axis == "mach" else at_reynolds(table, 3e5)
-    text, error = c81_text(one, name)
+    text, errors = c81_text(one, name)
     assert max(map(len, text.splitlines())) <= 70
     again, _ = table_of(name, polars(write(tmp_path, "a.c81", text)), None, 10.0)
     for i, mach in enumerate(again.numbers):
         cl, cd = interpolate(one, mach if table.axis == "mach" else 3e5, again.alpha, "linear")
-        np.testing.assert_allclose(again.cl[i], cl, rtol=0, atol=error + 5.1e-4)
-        np.testing.assert_allclose(again.cd[i], cd, rtol=0, atol=0.002)
-    assert error < 0.002
+        np.testing.assert_allclose(again.cl[i], cl, rtol=0, atol=errors[0] + 5.1e-4)
+        np.testing.assert_allclose(again.cd[i], cd, rtol=0, atol=errors[1] + 5.1e-5)
+    assert errors[0] < 0.002
+    assert errors[1] < 0.001
 
 
 # --- extensions -------------------------------------------------------------------------------------
@@ -232,24 +307,42 @@ def test_held_values_stay_to_90_deg():
 # --- refusals ---------------------------------------------------------------------------------------
 
 BAD = {
-    "no airfoil": ("hello\n<b>x</b>\n", ":1: 'hello' begins no airfoil file, allowed are C81,"),
-    "a short C81 file": (C81.rpartition("\n")[0], ":13: the file ends where 3 numbers must follow"),
+    "no airfoil": ("hello\n<b>x</b>\n", ":1: 'hello' begins no airfoil file, allowed are C81 tables,"),
+    "a short C81 file": (C81.rpartition("\n")[0], ":13: the file ends where 3 more numbers must follow"),
     "a C81 field": (C81.replace("-0.2900", " 0.2x00"), ":6: field 6 '0.2x00' must be a finite number"),
     "Mach numbers that fall": (
         C81.replace("    0.8\n", "    0.2\n"),
-        ":2: the Mach numbers of cl must increase, not fall",
+        ":2: Mach numbers of cl: 0.2 must be greater than 0.7",
     ),
     "a polar with a moving Reynolds number": (
         XFOIL.format(re=1.0).replace("1 1 Reynolds number fixed", "2 1 Reynolds number ~ 1/sqrt(CL)"),
-        ":6: '2 1 Reynolds number ~ 1/sqrt(CL) Mach number fixed' must be a polar at a fixed Reynolds number",
+        ":6: '2 1 Reynolds number ~ 1/sqrt(CL) Mach number fixed' must be fixed Reynolds and Mach numbers",
     ),
-    "an empty polar": (XFOIL.format(re=1.0), ":11: 0 angles must be at least 3"),
+    "an empty polar": (XFOIL.format(re=1.0), ":11: the polar has 0 angles, must have at least 3"),
     "a polar with text": (XFOIL.format(re=1.0) + "0.0 0.1 \x1b[31m\n", ":13: cd '?[31m' must be a finite number"),
     "a cut AeroDyn table": (
         AERODYN.replace("   180.00    0.000   0.0205\n", ""),
-        ": the table ends after 4 of 5 lines",
+        ":19: the table ends after 4 lines, must have 5, its NumAlf",
     ),
-    "a drag of zero": (AERODYN.replace("0.0205", "0.0"), ":15: cd 0 at 180 deg must be greater than 0"),
+    "tables that lack": (
+        AERODYN.replace("          2   NumTabs", "          3   NumTabs"),
+        ":20: the file has 2 tables, must have 3, its NumTabs",
+    ),
+    "a flap": (
+        AERODYN.replace("Re\n          0   UserProp", "Re\n          5   UserProp"),
+        ":14: control setting 5 must be that of the first table",
+    ),
+    "a count of angles": (
+        AERODYN.replace("5   NumAlf      !", "5.5 NumAlf      !"),
+        ":6: NumAlf '5.5' must be an integer from 1 to 10000",
+    ),
+    "a C81 count that is too low": (
+        C81.replace("10 3 2 4 0 0", "10 2 2 4 0 0"),
+        ":8: field 2 '0.0000-0.0100",
+    ),
+    "lift beyond all": (AERODYN.replace("1.358", "1358."), ":11: cl 1358 at 10 deg must be between -100 and 100"),
+    "an angle beyond": (AERODYN.replace("   -12.01", "  -192.01"), ":9: angle -192.01 must be between -180 and 180"),
+    "a drag of zero": (AERODYN.replace("0.0205", "0.0"), ":20: cd 0 at 180 deg must be greater than 0 and at most 100"),
 }
 
 
@@ -267,12 +360,14 @@ def test_bad_files_are_refused_in_one_line(tmp_path, case):
 
 def test_polars_that_do_not_fit_together_are_refused(tmp_path):
     one, same = xfoil(tmp_path, 1e6, 10), xfoil(tmp_path, 1e6, 10, "b.txt")
-    with pytest.raises(AirfoilError, match="two polars with Reynolds number 1000000, allowed is one"):
+    with pytest.raises(
+        AirfoilError, match=r"b.txt:11: a second polar with Reynolds number 1000000 beside .*a.txt:11, allowed is one"
+    ):
         table_of("w", polars(one, same), None, 10.0)
     other = write(
         tmp_path, "c.txt", xfoil(tmp_path, 2e6, 10, "c.txt").read_text().replace("Mach =   0.0", "Mach =   0.3")
     )
-    with pytest.raises(AirfoilError, match="at several Reynolds and several Mach numbers"):
+    with pytest.raises(AirfoilError, match="at several Reynolds and several Mach numbers, allowed is one"):
         table_of("w", polars(one, other), None, 10.0)
     with pytest.raises(AirfoilError, match="must have one Reynolds number"):
         c81_text(read_table(AIRFOILS / "naca0015.csv", 10.0), "x")
@@ -288,7 +383,7 @@ def test_the_command_tells_what_it_does_and_writes_what_aircraft_take(tmp_path):
     command = [sys.executable, str(EXECUTABLE), "a.txt", "b.txt", "--out", "wing.csv"]
     made = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
     assert (made.returncode, made.stderr) == (0, "")
-    assert "a.txt: XFOIL polar of NACA <b>2412</b>, 1 polars" in made.stdout
+    assert "a.txt: XFOIL polar of NACA <b>2412</b>, 1 polar\n" in made.stdout
     assert "extended below -8 and above 10 deg by viterna" in made.stdout
     table = read_table(tmp_path / "wing.csv", 10.0)
     assert interpolate(table, 1e6, 4 * DEG)[0] == pytest.approx(0.6, abs=1e-6)

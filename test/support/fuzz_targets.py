@@ -26,7 +26,8 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from sbs_sim import Aircraft, LinearModel, Simulation, linearize, simulate, sweep, trim
-from sbs_sim.aircraft.airfoil_files import read_airfoil, table_of
+from sbs_sim.aircraft.airfoil_files import read_airfoil
+from sbs_sim.aircraft.airfoil_files.table import table_of
 from sbs_sim.analysis.batch import Case, simulate_batch
 from sbs_sim.analysis.monte_carlo import gust_cases
 from sbs_sim.cockpit.recorded_snapshots import RecordedSnapshots

@@ -2,11 +2,11 @@
 # Made by tools/make_completion.py: do not edit.
 # shellcheck shell=bash disable=SC2207  # no completion has blanks in it
 
-_sbs_sim_names='simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep batch reproduce validate gusts plot aircraft'
+_sbs_sim_names='simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep batch reproduce validate gusts plot airfoil aircraft'
 _sbs_sim_own='build test shell python completion --help --version'
 _sbs_sim_aircraft='castles_gray coaxial hammond sbs sbs_paper tandem uh60a_genhel uh60a_tm85890'
 _sbs_sim_conditions='airspeed climb_rate sideslip_deg turn_rate_deg'
-_sbs_sim_paths='environment.air_density environment.kinematic_viscosity environment.gravity environment.speed_of_sound environment.altitude environment.temperature_offset body.mass body.inertia body.flat_plate_areas body.surfaces body.fuselage.reference body.fuselage.alpha_deg body.fuselage.beta_deg body.fuselage.drag.alpha body.fuselage.drag.beta body.fuselage.drag.grid body.fuselage.side.alpha body.fuselage.side.beta body.fuselage.side.grid body.fuselage.lift.alpha body.fuselage.lift.beta body.fuselage.lift.grid body.fuselage.roll.alpha body.fuselage.roll.beta body.fuselage.roll.grid body.fuselage.pitch.alpha body.fuselage.pitch.beta body.fuselage.pitch.grid body.fuselage.yaw.alpha body.fuselage.yaw.beta body.fuselage.yaw.grid body.fuselage.wash.rotor body.fuselage.wash.skew_deg body.fuselage.wash.down body.fuselage.wash.aft body.stand.free body.stand.mass body.stand.spring body.stand.damping options.coupling options.hub_moment options.flap_inertia options.elements options.interpolation controls.collective.range_deg controls.lateral_cyclic.range_deg controls.longitudinal_cyclic.range_deg controls.differential_longitudinal_cyclic.range_deg rotors.name rotors.hub rotors.shaft_direction rotors.rotation rotors.speed_rpm rotors.radius rotors.blades rotors.blade_mass rotors.blade_cg rotors.blade_inertia rotors.hinge_offset rotors.flap_hinge_offset rotors.flap_spring rotors.lag_spring rotors.flap_rest_deg rotors.lag_rest_deg rotors.lag_damping rotors.blade_lag_damping rotors.lag_damper.damping rotors.lag_damper.a rotors.lag_damper.b rotors.lag_damper.c rotors.lag_damper.d rotors.lag_damper.r rotors.pitch_flap_coupling rotors.pitch_lag_coupling rotors.chord.root rotors.chord.tip rotors.chord.stations rotors.chord.values rotors.twist_deg.root rotors.twist_deg.tip rotors.twist_deg.stations rotors.twist_deg.values rotors.root_cutout rotors.tip_loss rotors.swashplate_phase_deg rotors.airfoil rotors.duct_expansion rotors.collective_range_deg rotors.cyclic_range_deg rotors.swashplate_rate_deg rotors.mixing.collective rotors.mixing.lateral_cyclic rotors.mixing.longitudinal_cyclic rotors.swashplate_offset_deg.collective rotors.swashplate_offset_deg.lateral_cyclic rotors.swashplate_offset_deg.longitudinal_cyclic drives'
+_sbs_sim_paths='environment.air_density environment.kinematic_viscosity environment.gravity environment.speed_of_sound environment.altitude environment.temperature_offset body.mass body.inertia body.flat_plate_areas body.surfaces body.fuselage.reference body.fuselage.alpha_deg body.fuselage.beta_deg body.fuselage.drag.alpha body.fuselage.drag.beta body.fuselage.drag.grid body.fuselage.side.alpha body.fuselage.side.beta body.fuselage.side.grid body.fuselage.lift.alpha body.fuselage.lift.beta body.fuselage.lift.grid body.fuselage.roll.alpha body.fuselage.roll.beta body.fuselage.roll.grid body.fuselage.pitch.alpha body.fuselage.pitch.beta body.fuselage.pitch.grid body.fuselage.yaw.alpha body.fuselage.yaw.beta body.fuselage.yaw.grid body.fuselage.wash.rotor body.fuselage.wash.skew_deg body.fuselage.wash.down body.fuselage.wash.aft body.stand.free body.stand.mass body.stand.spring body.stand.damping options.coupling options.hub_moment options.flap_inertia options.elements options.interpolation controls.collective.range_deg controls.lateral_cyclic.range_deg controls.longitudinal_cyclic.range_deg controls.differential_longitudinal_cyclic.range_deg rotors.name rotors.hub rotors.shaft_direction rotors.rotation rotors.speed_rpm rotors.radius rotors.blades rotors.blade_mass rotors.blade_cg rotors.blade_inertia rotors.hinge_offset rotors.flap_hinge_offset rotors.flap_spring rotors.lag_spring rotors.flap_rest_deg rotors.lag_rest_deg rotors.lag_damping rotors.blade_lag_damping rotors.lag_damper.damping rotors.lag_damper.a rotors.lag_damper.b rotors.lag_damper.c rotors.lag_damper.d rotors.lag_damper.r rotors.pitch_flap_coupling rotors.pitch_lag_coupling rotors.chord.root rotors.chord.tip rotors.chord.stations rotors.chord.values rotors.twist_deg.root rotors.twist_deg.tip rotors.twist_deg.stations rotors.twist_deg.values rotors.root_cutout rotors.tip_loss rotors.swashplate_phase_deg rotors.airfoil rotors.outboard_airfoils.stations rotors.outboard_airfoils.values rotors.duct_expansion rotors.collective_range_deg rotors.cyclic_range_deg rotors.swashplate_rate_deg rotors.mixing.collective rotors.mixing.lateral_cyclic rotors.mixing.longitudinal_cyclic rotors.swashplate_offset_deg.collective rotors.swashplate_offset_deg.lateral_cyclic rotors.swashplate_offset_deg.longitudinal_cyclic drives'
 
 _sbs_sim_options() {
     case $1 in
@@ -21,18 +21,21 @@ _sbs_sim_options() {
         'validate') echo '--help --version --list --json --page --strict' ;;
         'gusts') echo '--help --version --aircraft --set --wind --turbulence --length --gust --gust-duration --seed --duration --delay --limit --json' ;;
         'plot') echo '--help --version --out --flight' ;;
+        'airfoil') echo '--help --version --out --extend --aspect-ratio --over --reynolds' ;;
         'aircraft') echo '--help --version --aircraft --set --out' ;;
     esac
 }
 
 _sbs_sim_follows() {
     case $1 in
-        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'validate --json' | 'validate --page' | 'gusts --json' | 'plot' | 'plot --out' | 'aircraft --out') echo '@files' ;;
+        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'validate --json' | 'validate --page' | 'gusts --json' | 'plot' | 'plot --out' | 'airfoil' | 'airfoil --out' | 'aircraft --out') echo '@files' ;;
         'replay --set' | 'trim --set' | 'linearize --set' | 'sweep --set' | 'batch --spread' | 'batch --set' | 'gusts --set' | 'aircraft --set') echo '@assigned' ;;
         'trim --aircraft' | 'linearize --aircraft' | 'sweep --aircraft' | 'batch --aircraft' | 'reproduce --aircraft' | 'reproduce --paper-aircraft' | 'gusts --aircraft' | 'aircraft --aircraft') echo '@aircraft' ;;
         'trim --method') echo 'newton two_loop' ;;
         'linearize --method') echo 'averaged paper' ;;
         'sweep') echo '@paths' ;;
+        'airfoil --extend') echo 'viterna montgomerie plate hold none' ;;
+        'airfoil --over') echo 'reynolds mach' ;;
     esac
 }
 

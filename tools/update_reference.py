@@ -326,7 +326,7 @@ frames of its arguments.
 """
 LAYERS = {
     "Library": ("sbs_sim",),
-    "Aircraft": ("sbs_sim.aircraft",),
+    "Aircraft": ("sbs_sim.aircraft", "sbs_sim.aircraft.airfoil_files"),
     "Flights": ("sbs_sim.flight",),
     "Analysis": ("sbs_sim.analysis",),
     "Recordings": ("sbs_sim.recording",),

@@ -61,15 +61,16 @@ class Aircraft(Description):
         Pilot controls: those of the paper's aircraft in its order, then others in that of the file.
     rotors : tuple of Rotor
     drives : tuple of Drive
-    tables : tuple of AirfoilTable
-        Section data of each rotor's blades; one object for rotors that have the same.
+    sections : tuple of tuple of AirfoilTable
+        Section data of each rotor's blades from the root outwards, see `Rotor.airfoil_at`; one object for sections
+        that are the same.
     data : dict
         The mapping of the file, with its keys and units; not to be changed.
     folder : Path
         Where relative paths of airfoils start.
     """
 
-    tables: tuple[AirfoilTable, ...] = field(repr=False, kw_only=True)
+    sections: tuple[tuple[AirfoilTable, ...], ...] = field(repr=False, kw_only=True)
     data: dict[str, Any] = field(repr=False, compare=False, kw_only=True)
     folder: Path = field(repr=False, compare=False, kw_only=True)
 
@@ -121,9 +122,9 @@ class Aircraft(Description):
         values = values_of(cls, data)
         if problems := table_problems(values["rotors"]):
             raise AircraftError("; ".join(problems))
-        known = (similar.rotors, similar.tables) if similar else ((), ())
-        tables = load_tables(values["rotors"], folder, *known)
-        aircraft = cls(**values, tables=tables, data=data, folder=folder.absolute())
+        known = (similar.rotors, similar.sections) if similar else ((), ())
+        sections = load_tables(values["rotors"], folder, *known)
+        aircraft = cls(**values, sections=sections, data=data, folder=folder.absolute())
         if problems := consistency_problems(aircraft):
             raise AircraftError("; ".join(problems))
         return aircraft
@@ -195,8 +196,22 @@ class Aircraft(Description):
     @property
     def airfoils(self) -> dict[str, AirfoilTable]:
         """Section data by the names in the file; of an extended airfoil the table of its first rotor."""
-        pairs = zip(self.rotors, self.tables, strict=True)
-        return {rotor.airfoil: table for rotor, table in reversed(list(pairs))}
+        pairs = [
+            pair
+            for rotor, tables in zip(self.rotors, self.sections, strict=True)
+            for pair in zip(rotor.airfoil_names, tables, strict=True)
+        ]
+        return dict(reversed(pairs))
+
+    def table_at(self, rotor: int, radius: float) -> AirfoilTable:
+        """Section data of the blades of a rotor, by its number, at a share of the radius from the axis."""
+        one = self.rotors[rotor]
+        return self.sections[rotor][int(one.airfoil_at(radius * one.radius - one.hinge_offset))]
+
+    def number_axis(self, rotor: int) -> str:
+        """What the airfoil tables of a rotor, by its number, are over besides the angle: "reynolds" or "mach"."""
+        tables = self.sections[rotor]
+        return next((table.axis for table in tables if len(table.numbers) > 1), tables[0].axis)
 
     @cached_property
     def layout(self) -> StateLayout:
@@ -225,10 +240,10 @@ class Aircraft(Description):
             for control in self.controls:
                 held = math.nan if control.held is None else control.held
                 _digest(digest, f"control {control.name} {control.unit}", held)
-        for table in self.tables:
+        for table in (table for tables in self.sections for table in tables):
             for name, values in ((table.axis, table.numbers), *((key, getattr(table, key)) for key in COEFFICIENTS)):
                 _digest(digest, name, values)
-        if any(table.axis == "mach" for table in self.tables):
+        if any(self.number_axis(j) == "mach" for j in range(len(self.rotors))):
             _digest(digest, "speed_of_sound", self.environment.speed_of_sound)
         return digest.hexdigest()
 
@@ -246,6 +261,8 @@ class Aircraft(Description):
             contents[names[airfoil]] = config_file.find_file(airfoil, "airfoils", ".csv", self.folder).read_bytes()
         for entry in data["rotors"]:
             entry["airfoil"] = names[entry["airfoil"]]
+            if "outboard_airfoils" in entry:
+                entry["outboard_airfoils"]["values"] = [names[name] for name in entry["outboard_airfoils"]["values"]]
         return data, contents
 
     def mix(self, controls: ArrayLike) -> Array:
@@ -446,14 +463,24 @@ class Aircraft(Description):
 
     @cached_property
     def stall_table(self) -> Array:
-        """Reynolds or Mach numbers and stall angles of every rotor as `working_state` takes them, (n_rotors, 3, n)."""
-        size = max(len(table.numbers) for table in self.tables)
-        return np.array(
-            [
-                np.pad((table.numbers, *stall_angles(table)), ((0, 0), (0, size - len(table.numbers))), "edge")
-                for table in self.tables
-            ]
-        )
+        """What `working_state` takes of every airfoil of every rotor, shape (n_rotors, airfoils, 5, n).
+
+        Reynolds or Mach numbers, the highest and lowest angle of attack [rad] at which the section is not stalled, and
+        the least and largest number for which the table holds; filled up with copies of the last.
+        """
+        size = max(len(table.numbers) for tables in self.sections for table in tables)
+        most = max(map(len, self.sections))
+        return np.array([[_stall_rows(table, size) for table in _filled_up(tables, most)] for tables in self.sections])
+
+
+def _filled_up(tables: tuple[AirfoilTable, ...], count: int) -> tuple[AirfoilTable, ...]:
+    return (*tables, *[tables[-1]] * (count - len(tables)))
+
+
+def _stall_rows(table: AirfoilTable, size: int) -> Array:
+    count = len(table.numbers)
+    rows = (table.numbers, *stall_angles(table), *(np.full(count, end) for end in table.range))
+    return np.pad(rows, ((0, 0), (0, size - count)), "edge")
 
 
 def axis_controls(axes: Sequence[str], units: Sequence[str]) -> NDArray[np.int64]:

@@ -1,4 +1,4 @@
-"""The airfoil tables of an aircraft's rotors: found, read once, and shared where blades have the same."""
+"""The airfoil tables of an aircraft's rotors: found, read once, and shared where sections are the same."""
 
 import itertools
 from collections.abc import Sequence
@@ -9,18 +9,20 @@ from sbs_sim.config_file import find_file
 from sbs_sim.errors import AircraftError, AirfoilError
 from sbs_sim.model.airfoil import AirfoilTable, read_table
 
+Tables = tuple[AirfoilTable, ...]
+
 
 def load_tables(
-    rotors: Sequence[Rotor], folder: Path, known_rotors: Sequence[Rotor] = (), known_tables: Sequence[AirfoilTable] = ()
-) -> tuple[AirfoilTable, ...]:
-    """Airfoil table of every rotor; a partial table is extended for the aspect ratio of its blades.
+    rotors: Sequence[Rotor], folder: Path, known_rotors: Sequence[Rotor] = (), known_tables: Sequence[Tables] = ()
+) -> tuple[Tables, ...]:
+    """Airfoil tables of every rotor, root first; a partial table is extended for the aspect ratio of its blades.
 
     Parameters
     ----------
     rotors : sequence of Rotor
     folder : Path
         Where relative paths of airfoils start.
-    known_rotors, known_tables : sequences of Rotor and AirfoilTable
+    known_rotors, known_tables : sequences of Rotor and of their tables
         Rotors of the same folder and their tables, which are not read again.
 
     Raises
@@ -28,33 +30,40 @@ def load_tables(
     AircraftError, AirfoilError
         A file does not exist or holds no table: one line that names the rotor.
     """
-    known = {_section(rotor): table for rotor, table in zip(known_rotors, known_tables, strict=True)}
-    tables = []
+    known = {
+        (name, _aspect_ratio(rotor)): table
+        for rotor, tables in zip(known_rotors, known_tables, strict=True)
+        for name, table in zip(rotor.airfoil_names, tables, strict=True)
+    }
+    found = []
     for i, rotor in enumerate(rotors):
-        section = _section(rotor)
-        if section not in known:
-            known[section] = _read_table(i, rotor, folder, {name: table for (name, _), table in known.items()})
-        tables.append(known[section])
-    return tuple(tables)
+        for k, name in enumerate(rotor.airfoil_names):
+            section = name, _aspect_ratio(rotor)
+            if section not in known:
+                key = f"rotors[{i}].outboard_airfoils.values[{k - 1}]" if k else f"rotors[{i}].airfoil"
+                others = {other: table for (other, _), table in known.items()}
+                known[section] = _read_table(key, *section, folder, others)
+        found.append(tuple(known[name, _aspect_ratio(rotor)] for name in rotor.airfoil_names))
+    return tuple(found)
 
 
-def _section(rotor: Rotor) -> tuple[str, float]:
-    """Airfoil and aspect ratio of a rotor's blades."""
-    return rotor.airfoil, rotor.radius / rotor.mean_chord
+def _aspect_ratio(rotor: Rotor) -> float:
+    """Aspect ratio of a rotor's blades."""
+    return rotor.radius / rotor.mean_chord
 
 
-def _read_table(i: int, rotor: Rotor, folder: Path, known: dict[str, AirfoilTable]) -> AirfoilTable:
-    """Table of a rotor: the known one of its airfoil, if that is the same for every blade, else from the file."""
+def _read_table(key: str, name: str, aspect_ratio: float, folder: Path, known: dict[str, AirfoilTable]) -> AirfoilTable:
+    """Table of an airfoil: the known one, if that is the same for every blade, else from the file."""
     try:
-        path = find_file(rotor.airfoil, "airfoils", ".csv", folder)
+        path = find_file(name, "airfoils", ".csv", folder)
     except AircraftError as error:
-        raise AircraftError(f"rotors[{i}].{error}") from None
-    if rotor.airfoil in known and _covers_circle(path):
-        return known[rotor.airfoil]
+        raise AircraftError(f"{key}{str(error).removeprefix('airfoil')}") from None
+    if name in known and _covers_circle(path):
+        return known[name]
     try:
-        return read_table(path, _section(rotor)[1])
+        return read_table(path, aspect_ratio)
     except AirfoilError as error:
-        raise AirfoilError(f"rotors[{i}].airfoil = {rotor.airfoil!r}: {error}") from None
+        raise AirfoilError(f"{key} = {name!r}: {error}") from None
 
 
 def _covers_circle(path: Path) -> bool:

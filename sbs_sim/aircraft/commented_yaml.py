@@ -43,8 +43,14 @@ def commented_yaml(aircraft: "Aircraft") -> str:
 
 
 def _with_absolute_airfoil(rotor: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    path = folder / rotor["airfoil"]
-    return {**rotor, "airfoil": str(path)} if path.is_file() else dict(rotor)
+    made = {**rotor, "airfoil": _absolute(rotor["airfoil"], folder)}
+    if outboard := rotor.get("outboard_airfoils"):
+        made["outboard_airfoils"] = {**outboard, "values": [_absolute(name, folder) for name in outboard["values"]]}
+    return made
+
+
+def _absolute(name: str, folder: Path) -> str:
+    return str(folder / name) if (folder / name).is_file() else name
 
 
 def _commented(node: Any, schema: Mapping[str, Any]) -> Any:

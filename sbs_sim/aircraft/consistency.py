@@ -8,6 +8,7 @@ import numpy as np
 
 from sbs_sim.aircraft.description import STAND_AXES, TRIMMED_CONTROLS, Array, Range, Rotor
 from sbs_sim.aircraft.part_consistency import part_problems
+from sbs_sim.model.airfoil import FINEST_DEG, MAX_HALF, NUMBER_NAMES, common_half
 from sbs_sim.model.state import CONTROL_NAMES, EULER_NAMES, SWASHPLATE_NAMES
 
 if TYPE_CHECKING:
@@ -30,7 +31,38 @@ def table_problems(rotors: Sequence[Rotor]) -> list[str]:
         for i, rotor in enumerate(rotors)
         for key, name in (("chord", "chord"), ("twist_deg", "twist"))
         for problem in _table_problems(**{part: getattr(rotor, f"{name}_{part}") for part in (*LINE, *TABLE)})
+    ] + [
+        f"rotors[{i}].outboard_airfoils{problem}"
+        for i, rotor in enumerate(rotors)
+        for problem in _airfoil_problems(rotor.outboard_stations, rotor.outboard_airfoils)
     ]
+
+
+def _airfoil_problems(stations: Array | None, values: tuple[str, ...] | None) -> list[str]:
+    if stations is None and values is None:
+        return []
+    if stations is None or values is None:
+        return [f".{TABLE[0] if stations is None else TABLE[1]}: missing key"]
+    if len(stations) != len(values):
+        return [f".values: allowed are {len(stations)} names, one of each station, not {len(values)}"]
+    if not np.all(np.diff(stations) > 0):
+        return [f".stations = {stations.tolist()}: allowed are increasing numbers"]
+    return []
+
+
+def _section_problems(aircraft: "Aircraft", i: int) -> list[str]:
+    """Tables along a blade must fit together: one axis, and angles of one step."""
+    tables, names = aircraft.sections[i], aircraft.rotors[i].airfoil_names
+    axis = aircraft.number_axis(i)
+    for k, (table, name) in enumerate(zip(tables, names, strict=True)):
+        if table.axis != axis and len(table.numbers) > 1:
+            own, allowed = NUMBER_NAMES[table.axis], NUMBER_NAMES[axis]
+            where = f"rotors[{i}].outboard_airfoils.values[{k - 1}] = {name!r}"
+            return [f"{where}: is over the {own}, allowed are tables over the {allowed} as the one inboard"]
+    if common_half(tables) > max(MAX_HALF, *(table.half for table in tables)):
+        allowed = f"tables whose angles are multiples of one step of {FINEST_DEG:g} deg or more"
+        return [f"rotors[{i}].outboard_airfoils.values = {list(names[1:])}: allowed are {allowed}"]
+    return []
 
 
 def _table_problems(**parts: Any) -> list[str]:
@@ -64,6 +96,7 @@ def consistency_problems(aircraft: "Aircraft") -> list[str]:
     problems += part_problems(aircraft)
     for i, rotor in enumerate(aircraft.rotors):
         problems += [f"rotors[{i}].{problem}" for problem in _rotor_problems(rotor)]
+        problems += _section_problems(aircraft, i)
     names = [rotor.name for rotor in aircraft.rotors]
     surfaces = [surface.name for surface in aircraft.body.surfaces]
     named = [("name", aircraft.name), *((f"rotors[{i}].name", name) for i, name in enumerate(names))]

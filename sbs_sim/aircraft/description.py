@@ -370,7 +370,7 @@ def _linkage(letter: str, text: str) -> Any:
     )
 
 
-MAX_STATIONS = 200
+MAX_STATIONS, MAX_AIRFOILS = 200, 20
 
 
 def _stations(key: str) -> Any:
@@ -515,6 +515,22 @@ class Rotor(ByContent):
     )
     swashplate_phase: float = number("Phase of the swashplate against the blades", -360, 360, "deg", symbol=r"\psi_s")
     airfoil: str = string("Airfoil table: a name in config/airfoils, or a path", is_physics=False)  # its table counts
+    outboard_stations: Array | None = declared(
+        "Where other airfoils begin, as shares of the radius from the axis, increasing",
+        list_schema(number_schema(0, 1), 1, MAX_AIRFOILS),
+        frozen,
+        unit="1",
+        key="outboard_airfoils.stations",
+        default=None,
+    )
+    outboard_airfoils: tuple[str, ...] | None = declared(
+        "Airfoil tables outboard of each of these, as `airfoil`, each up to the next, without blending",
+        list_schema({"type": "string", "minLength": 1}, 1, MAX_AIRFOILS),
+        tuple,
+        key="outboard_airfoils.values",
+        default=None,
+        is_physics=False,
+    )
     duct_expansion: float = number(
         "Wake expansion ratio of the duct; 0.5 is an open rotor", 0.25, 2, symbol="a_w", model_field="duct_expansion"
     )
@@ -555,6 +571,16 @@ class Rotor(ByContent):
             return np.interp((self.hinge_offset + share * self.blade_length) / self.radius, stations, values)
         assert root is not None and tip is not None, "checked with the file"  # noqa: PT018
         return root + share * (tip - root)
+
+    @property
+    def airfoil_names(self) -> tuple[str, ...]:
+        """Airfoil tables from the root outwards, as the file names them."""
+        return (self.airfoil, *(self.outboard_airfoils or ()))
+
+    def airfoil_at(self, span: Any) -> NDArray[np.int64]:
+        """Number in `airfoil_names` of the airfoil at distances from the flap hinge [m], a number or an array."""
+        stations = np.zeros(0) if self.outboard_stations is None else self.outboard_stations
+        return np.searchsorted(stations, (self.hinge_offset + np.asarray(span)) / self.radius, side="right")
 
     @property
     def mean_chord(self) -> float:

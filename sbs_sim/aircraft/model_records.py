@@ -10,7 +10,7 @@ from sbs_sim.aircraft.declaration import model_values
 from sbs_sim.aircraft.description import ENGINES, Body, Drive, Rotor
 from sbs_sim.aircraft.surfaces import parts_of
 from sbs_sim.model import records as R
-from sbs_sim.model.airfoil import AirfoilTable, cell_grid, cells
+from sbs_sim.model.airfoil import DEGREE, AirfoilTable, Grid, cell_grid, cells, common_grid
 from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import hub_axes
 from sbs_sim.model.state import ENGINE_TORQUE, GOVERNOR, SPEED, UNSEEN_NAMES, harmonic_count
@@ -25,23 +25,19 @@ MIN_DENSITY = 1e-12  # kg/m^3, less than at 300 km: below it is vacuum
 
 def model_of(aircraft: "Aircraft") -> R.Model:
     """Records of an aircraft with lag and cyclic inflow (theory.md section 7)."""
-    airfoils = list(dict.fromkeys(aircraft.tables))
-    tables = [cells(airfoil, aircraft.options.interpolation) for airfoil in airfoils]
-    first_rows = dict(zip(airfoils, np.cumsum([0, *map(len, tables)])[:-1].tolist(), strict=True))
-    table = R.aligned((sum(map(len, tables)), tables[0].shape[1]), float)
-    table[:] = np.concatenate(tables)
-    most = max(len(airfoil.knots) for airfoil in airfoils) - 2
+    grids = [common_grid(tables) for tables in aircraft.sections]
+    table, first_rows = _packed_tables(aircraft, grids)
+    most = max(len(grid.knots) for grid in grids) - 2
     blades = R.records(R.BLADE, aircraft.layout.blade_count, 1)
     knots = R.aligned((len(blades), most, 1), float)
     quads = np.cumsum([0, *(-(-rotor.blades // R.QUAD) for rotor in aircraft.rotors)])
     number = 0
     for j, rotor in enumerate(aircraft.rotors):
-        airfoil = aircraft.tables[j]
         for k in range(rotor.blades):
-            _set(blades[number], _blade_values(aircraft, rotor, k, airfoil, first_rows[airfoil]))
+            _set(blades[number], _blade_values(aircraft, rotor, k, grids[j]))
             blades[number]["quad"], blades[number]["starts_quad"] = quads[j] + k // R.QUAD, k % R.QUAD == 0
             blades[number]["elements"], blades[number]["harmonics"] = j, harmonic_count(rotor.blades)
-            inner = airfoil.knots[1:-1]
+            inner = grids[j].knots[1:-1]
             knots[number, :, 0] = np.concatenate([inner, np.full(most - len(inner), np.inf)])
             number += 1
     return R.Model(
@@ -52,12 +48,26 @@ def model_of(aircraft: "Aircraft") -> R.Model:
         drives=_drives(aircraft),
         blades=blades,
         indices=_state_indices(aircraft, quads),
-        elements=_elements(aircraft),
+        elements=_elements(aircraft, first_rows),
         knots=knots,
         table=table,
         stall=_stall(aircraft),
         **parts_of(aircraft.body, aircraft.rotors)._asdict(),
     )
+
+
+def _packed_tables(aircraft: "Aircraft", grids: list[Grid]) -> tuple[Array, list[list[int]]]:
+    """Cells of all airfoils, each once on each grid, and where those of each airfoil of each rotor begin."""
+    parts, found = dict[tuple[AirfoilTable, Grid], Array](), list[list[tuple[AirfoilTable, Grid]]]()
+    for grid, tables in zip(grids, aircraft.sections, strict=True):
+        found.append([(table, grid) for table in tables])
+        for table in tables:
+            if (table, grid) not in parts:
+                parts[table, grid] = cells(table, aircraft.options.interpolation, grid)
+    starts = dict(zip(parts, np.cumsum([0, *map(len, parts.values())])[:-1].tolist(), strict=True))
+    packed = R.aligned((sum(map(len, parts.values())), 4 * (DEGREE + 1)), float)
+    packed[:] = np.concatenate(list(parts.values()))
+    return packed, [[starts[key] for key in keys] for keys in found]
 
 
 def _stall(aircraft: "Aircraft") -> Array:
@@ -137,11 +147,9 @@ def second_moment(aircraft: "Aircraft", rotor: Rotor) -> float:
     return rotor.blade_mass * (rotor.radius * rotor.radius) / 3 if to_axis else rotor.second_moment
 
 
-def _blade_values(
-    aircraft: "Aircraft", rotor: Rotor, number: int, airfoil: AirfoilTable, first_row: int
-) -> dict[str, Any]:
+def _blade_values(aircraft: "Aircraft", rotor: Rotor, number: int, grid: Grid) -> dict[str, Any]:
     """Values of a blade's record except the integers."""
-    columns, first_angle, inverse_step = cell_grid(airfoil)
+    columns, first_angle, inverse_step = cell_grid(grid)
     cos_phase, sin_phase = cosine_and_sine(rotor.swashplate_phase)
     cos_azimuth_offset, sin_azimuth_offset = cosine_and_sine(2.0 * math.pi * number / rotor.blades)
     inertia, factor = second_moment(aircraft, rotor), float(rotor.lag_damping_factors[number])
@@ -166,9 +174,8 @@ def _blade_values(
         "first_alpha": first_angle,
         "inverse_alpha_step": inverse_step,
         "alpha_cells": columns,
-        "first_row": first_row,
-        "min_number": airfoil.range[0],
-        "max_number": airfoil.range[1],
+        "min_number": grid.range[0],
+        "max_number": grid.range[1],
     }
 
 
@@ -289,19 +296,21 @@ def _state_indices(aircraft: "Aircraft", quads: NDArray[np.int64]) -> R.StateInd
     )
 
 
-def _elements(aircraft: "Aircraft") -> NDArray[Any]:
+def _elements(aircraft: "Aircraft", first_rows: list[list[int]]) -> NDArray[Any]:
     count = aircraft.options.elements
     elements = R.records(R.ELEMENT, (len(aircraft.rotors), count), 1)
     for j, rotor in enumerate(aircraft.rotors):
         for name, values in zip(R.ELEMENT, rotor.elements(count), strict=False):
             elements[name][j, :, 0] = values
         elements["number_scale"][j] = number_scale(aircraft, j, elements["chord"][j])
+        airfoil = rotor.airfoil_at(elements["span"][j])
+        elements["airfoil"][j], elements["first_row"][j] = airfoil, np.array(first_rows[j])[airfoil]
     return elements
 
 
 def number_scale(aircraft: "Aircraft", rotor: int, chord: Any) -> Any:
     """Reynolds or Mach number, whichever the rotor's airfoil table is over, of a section over its airspeed [s/m]."""
     environment = aircraft.environment
-    if aircraft.tables[rotor].axis == "mach":
+    if aircraft.number_axis(rotor) == "mach":
         return 1.0 / environment.speed_of_sound
     return chord * (1.0 / environment.kinematic_viscosity)

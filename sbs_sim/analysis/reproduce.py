@@ -625,7 +625,7 @@ def _conditions(craft: Mapping[str, Aircraft], models: Mapping[str, Mapping[str,
         "aircraft": {
             name: {
                 "name": one.name,
-                "airfoil": sorted({rotor.airfoil for rotor in one.rotors}),
+                "airfoil": sorted({name for rotor in one.rotors for name in rotor.airfoil_names}),
                 "air_density": one.environment.air_density,
                 "gravity": one.environment.gravity,
                 "trim_residual": max(model.trim.residual for model in models[name].values()),

@@ -102,7 +102,7 @@ class MomentumRotor:
         # thrust is this times the induced velocity times the flow through the disc, eq. (6.1)
         self._mass_flow = self._density * self.area / (2 * rotor.duct_expansion**2)
         number = 0.75 * self.tip_speed * float(number_scale(aircraft, j, rotor.mean_chord))
-        curve = _lift_curve(aircraft.tables[j], number)
+        curve = _lift_curve(aircraft.table_at(j, 0.75), number)
         self._sum_sections(rotor, rotor.elements(aircraft.options.elements), *curve)
         self._hold_blades(rotor, second_moment(aircraft, rotor), aircraft.environment.gravity)
         self.wrench = self._make_wrench(rotor.hub)

@@ -16,6 +16,7 @@ EXECUTABLES = {
     "validate": ("sbs_sim.commands.validate:main", "published results of others beside ours"),
     "gusts": ("sbs_sim.commands.gusts:main", "design the hover hold, and test it in turbulence and gusts"),
     "plot": ("sbs_sim.commands.plot:main", "draw a log over time"),
+    "airfoil": ("sbs_sim.commands.airfoil:main", "airfoil data of other programs as a table"),
     "aircraft": ("sbs_sim.commands.aircraft:main", "write an aircraft as a commented file"),
     "simulator": ("sbs_sim.nodes.executables:simulator", "fly in real time (ROS 2)"),
     "control_mixer": ("sbs_sim.nodes.executables:control_mixer", "pilot controls to swashplates (ROS 2)"),

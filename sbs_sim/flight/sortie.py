@@ -175,9 +175,10 @@ def structure(simulation: Simulation) -> Any:
     """What flights that are flown side by side have in common."""
     aircraft, model = simulation.aircraft, simulation.model
     blades = tuple(rotor.blades for rotor in aircraft.rotors)
+    sections = tuple(tuple(map(id, tables)) for tables in aircraft.sections)
     drives = model.rotors["drive"], model.drives["engine"], model.drives["free_wheel"]
     return (
-        *(blades, aircraft.options, tuple(map(id, aircraft.tables)), simulation.steps_per_tick, simulation.method),
+        *(blades, aircraft.options, sections, simulation.steps_per_tick, simulation.method),
         *(simulation.tick, simulation.step, model.switches.tobytes()),
         *(aircraft.layout.drives, *(part.tobytes() for part in drives)),
     )

@@ -142,7 +142,7 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
         Of `sbs_sim.model.working_state`.
     """
     found = []
-    for rotor, table, row in zip(aircraft.rotors, aircraft.tables, rows, strict=True):
+    for j, (rotor, row) in enumerate(zip(aircraft.rotors, rows, strict=True)):
         state = working_state(row)
         if state.inflow_state in (VORTEX_RING, TURBULENT_WAKE):
             found.append(f"{rotor.name}: {state.inflow_state} state, where momentum theory does not hold")
@@ -152,13 +152,21 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
             found.append(f"{rotor.name}: stall on more than {MAX_STALLED:.0%} of the disc, without its dynamics")
         if state.reversed_share > MAX_REVERSED:
             found.append(f"{rotor.name}: reverse flow on more than {MAX_REVERSED:.0%} of the disc")
-        if table.axis != "mach" and tip_mach(aircraft, rotor, row) > MAX_TIP_MACH:
+        if aircraft.number_axis(j) != "mach" and tip_mach(aircraft, rotor, row) > MAX_TIP_MACH:
             found.append(f"{rotor.name}: tip Mach number above {MAX_TIP_MACH:g}, {INCOMPRESSIBLE}")
         if state.outside_share > MAX_OUTSIDE:
-            low, high = table.range
-            known = f"{NUMBER_NAMES[table.axis]} outside {low:g} to {high:g}, those of the airfoil table,"
+            known = f"{NUMBER_NAMES[aircraft.number_axis(j)]} outside {_known_numbers(aircraft, j)},"
             found.append(f"{rotor.name}: {known} on more than {MAX_OUTSIDE:.0%} of the disc")
     return found
+
+
+def _known_numbers(aircraft: Aircraft, rotor: int) -> str:
+    """Reynolds or Mach numbers of the airfoil tables of a rotor in words."""
+    ranges = dict.fromkeys(table.range for table in aircraft.sections[rotor] if len(table.numbers) > 1)
+    if len(ranges) > 1:
+        return "those of the airfoil tables"
+    ((low, high),) = ranges
+    return f"{low:g} to {high:g}, those of the airfoil table"
 
 
 def flight_warnings(aircraft: Aircraft, working: Array) -> Iterator[str]:
@@ -177,7 +185,9 @@ def _is_quiet(aircraft: Aircraft, working: Array) -> NDArray[np.bool_]:
     """Instants of which `warnings` surely says nothing, shape (n,); most are, and words take long."""
     sound = aircraft.environment.speed_of_sound
     tips = np.array([rotor.speed * rotor.radius for rotor in aircraft.rotors])
-    limits = np.array([math.inf if table.axis == "mach" else MAX_TIP_MACH for table in aircraft.tables])
+    limits = np.array(
+        [math.inf if aircraft.number_axis(j) == "mach" else MAX_TIP_MACH for j in range(len(aircraft.rotors))]
+    )
     quiet = (
         (working[..., W.ADVANCE_RATIO] <= MAX_ADVANCE_RATIO)
         & (working[..., W.STALLED] <= MAX_STALLED)

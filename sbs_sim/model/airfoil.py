@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +35,8 @@ MIN_STEP_DEG, MAX_STEP_DEG = 0.01, 10.0
 MAX_FAR_STEP_DEG, FAR_DEG = 45.0, 30.0  # between angles of which one is beyond FAR_DEG
 STEP_TOLERANCE = 0.01  # of a step, for angles that were rounded in the file
 FINEST_DEG, ROUNDING_DEG = 0.05, 0.001  # of the common step of uneven angles
+MAX_HALF = round(180 / FINEST_DEG)
+MAX_BYTES = 20_000_000  # of a file: a table of 0.05 deg has a quarter of a megabyte for each number
 ATTACHED = math.radians(5.0)  # from the angle of no lift: so far the flow is taken to be attached
 SEPARATED = 0.5  # of the lift of attached flow: below, the flow has left the section
 
@@ -87,16 +90,17 @@ class AirfoilTable(ByContent):
 
 
 def half_turn(alpha: Array) -> int:
-    """Steps in 180 deg of the coarsest even grid that has all angles [rad]; 0 if its step were below `FINEST_DEG`.
+    """Steps in 180 deg of the coarsest even grid that has all angles [rad]; 0 if there is none.
 
-    Even angles that were rounded may be off by a hundredth of their step, uneven ones by a thousandth of a degree.
+    Uneven angles must be multiples of `FINEST_DEG`. Even ones that were rounded may be off by a hundredth of their
+    step, uneven ones by a thousandth of a degree.
     """
     angles = np.degrees(alpha)
     step = (angles[-1] - angles[0]) / (len(angles) - 1)
     half = max(1, round(float(180 / step)))
     if np.all(np.abs(np.diff(angles) - step) <= STEP_TOLERANCE * step) and _are_multiples(angles, half, STEP_TOLERANCE):
         return half
-    for half in range(1, round(180 / FINEST_DEG) + 1):
+    for half in (number for number in range(1, MAX_HALF + 1) if MAX_HALF % number == 0):
         if _are_multiples(angles, half, ROUNDING_DEG / 180 * half):
             return half
     return 0
@@ -220,11 +224,8 @@ def extend_polar(alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: f
         From -pi to pi, beyond the given angles with the common step of these; cl and cd are equal at both ends.
     """
     alpha, cl, cd = (np.asarray(values, dtype=np.float64) for values in (alpha, cl, cd))
-    half = half_turn(alpha)
-    circle = np.arange(-half, half + 1) * (np.pi / half)
-    kept = half + np.rint(alpha / np.pi * half).astype(np.int64)
-    circle = np.concatenate([circle[: kept[0]], circle[kept], circle[kept[-1] + 1 :]])
-    first, last = kept[0], kept[0] + len(alpha) - 1
+    circle, first = circle_of(alpha)
+    last = first + len(alpha) - 1
     low, high = -circle[first], circle[last]
     below = viterna(circle[:first], low, -cl[0], cd[0], aspect_ratio)
     above = viterna(circle[last + 1 :], high, cl[-1], cd[-1], aspect_ratio)
@@ -237,14 +238,22 @@ def extend_polar(alpha: ArrayLike, cl: ArrayLike, cd: ArrayLike, aspect_ratio: f
     return np.asarray(circle, np.float64), circle_cl, circle_cd
 
 
+def circle_of(alpha: Array) -> tuple[Array, int]:
+    """Angles from -pi to pi [rad], beyond given ones with their common step, and the index of the first given one."""
+    half = half_turn(alpha)
+    circle = np.arange(-half, half + 1) * (np.pi / half)
+    kept = half + np.rint(alpha / np.pi * half).astype(np.int64)
+    return np.concatenate([circle[: kept[0]], circle[kept], circle[kept[-1] + 1 :]]), int(kept[0])
+
+
 def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
     """Read an airfoil table from a CSV file.
 
     The file has the header `reynolds,alpha_deg,cl,cd` or `mach,alpha_deg,cl,cd` and a full grid: one block of rows for
     each Reynolds or Mach number, in increasing order, each with the same angles; or the header `alpha_deg,cl,cd` and
     one block, for all numbers. Lines that begin with '#' are comments. The angles run from -180 to 180 deg, or over an
-    attached range around zero that `extend_polar` completes. They are multiples of one step, 0.05 deg or more if they
-    are uneven.
+    attached range around zero that `extend_polar` completes. They are even in a step that divides 180 deg, or multiples
+    of 0.05 deg.
 
     Parameters
     ----------
@@ -263,7 +272,12 @@ def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
         With one line: file, line, column, the value and what is allowed.
     """
     path = Path(path)
-    columns, values, lines = _read_rows(path)
+    return parse_table(path, read_text(path), aspect_ratio)
+
+
+def parse_table(path: Path, text: str, aspect_ratio: float) -> AirfoilTable:
+    """Airfoil table of the text of a file, see `read_table`; the path is for its name and for messages."""
+    columns, values, lines = parse_rows(path, text)
     axis = columns[0] if columns[0] in AXES else AXES[0]
     blocks = _split_blocks(path, axis, values, lines)
     half = _check_angles(path, axis, values, lines, blocks)
@@ -280,14 +294,28 @@ def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
     return AirfoilTable(path.stem, numbers, circle[0], circle_cl, circle_cd, (float(alpha[0]), float(alpha[-1])), axis)
 
 
-def _read_rows(path: Path) -> tuple[tuple[str, ...], Array, list[int]]:
-    """Columns of the file, all rows as numbers, shape (n, 4), and the line number of each."""
+def read_text(path: Path, errors: str = "strict") -> str:
+    """Text of a file of at most `MAX_BYTES`; bytes that are no UTF-8 are treated as `bytes.decode` does with `errors`.
+
+    Raises
+    ------
+    AirfoilError
+        It cannot be read, is too long, or is no text.
+    """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+        if len(content) > MAX_BYTES:
+            raise AirfoilError(f"{path}: the file has more than {MAX_BYTES} bytes, allowed for airfoil tables")
+        return content.decode("utf-8-sig", errors)
     except OSError as error:
         raise AirfoilError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise AirfoilError(f"{path}: byte {error.start} is not UTF-8 text") from error
+
+
+def parse_rows(path: Path, text: str) -> tuple[tuple[str, ...], Array, list[int]]:
+    """Columns of a CSV file, all rows as numbers, shape (n, 4), and the line number of each."""
     content = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1)]
     content = [(i, line) for i, line in content if line and not line.startswith("#")]
     if not content:
@@ -369,7 +397,7 @@ def _check_angles(path: Path, axis: str, values: Array, lines: list[int], blocks
         return half
     found = [half_turn(np.radians(angles[:i])) for i in range(2, len(angles) + 1)]
     i = found.index(0) + 1  # the first that does not fit to those above
-    allowed = f"a multiple of a step that divides 180, that all angles have, and that is {FINEST_DEG:g} or more"
+    allowed = f"a multiple of {FINEST_DEG:g}, as angles that are uneven or whose step does not divide 180"
     raise _bad(path, lines[i], "alpha_deg", angles[i], allowed)
 
 
@@ -404,30 +432,69 @@ def _check_ends(path: Path, lines: list[int], blocks: list[slice], cl: Array, cd
 
 
 def write_table(path: str | Path, table: AirfoilTable, comments: Sequence[str] = ()) -> None:
-    """Write a table in the format of `read_table`, coefficients rounded to six decimals.
+    """Write a table in the format of `read_table`, coefficients rounded to six decimals."""
+    Path(path).write_text(table_text(table, comments), encoding="utf-8")
+
+
+def table_text(table: AirfoilTable, comments: Sequence[str] = ()) -> str:
+    """Text of a table in the format of `read_table`, coefficients rounded to six decimals.
 
     Parameters
     ----------
-    path : str or Path
     table : AirfoilTable
+        One that ends at stall may have the given angles only.
     comments : sequence of str
         Lines on the table's origin, written on top behind '# '.
     """
     angles = np.rint(table.alpha / np.pi * table.half) * 180 / table.half
-    lines = [f"# {comment}".rstrip() for comment in comments] + [",".join((table.axis, *POLAR_COLUMNS))]
+    is_for_all = len(table.numbers) == 1 and table.numbers[0] == 0.0
+    columns = POLAR_COLUMNS if is_for_all else (table.axis, *POLAR_COLUMNS)
+    lines = [f"# {comment}".rstrip() for comment in comments] + [",".join(columns)]
     for i, number in enumerate(table.numbers):
         for j, angle in enumerate(angles):
             # Adding zero turns a rounded -0 into 0.
             cl, cd = round(table.cl[i, j], 6) + 0.0, round(table.cd[i, j], 6)
-            lines.append(f"{number:.10g},{angle:.10g},{cl:.6f},{cd:.6f}")
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+            lines.append(f"{'' if is_for_all else f'{number:.10g},'}{angle:.10g},{cl:.6f},{cd:.6f}")
+    return "\n".join(lines) + "\n"
 
 
 INTERPOLATIONS = ("smooth", "linear")
 DEGREE = 3  # of the polynomials along the angle
 
 
-def cells(table: AirfoilTable, interpolation: str) -> Array:
+class Grid(NamedTuple):
+    """Grid of cells of one or several tables.
+
+    Attributes
+    ----------
+    half : int
+        Cells in 180 deg.
+    knots : tuple of float
+        Reynolds or Mach numbers, at least two.
+    range : (float, float)
+        Least and largest number for which any of the tables holds.
+    """
+
+    half: int
+    knots: tuple[float, ...]
+    range: tuple[float, float]
+
+
+def common_half(tables: Sequence[AirfoilTable]) -> int:
+    """Steps in 180 deg of the coarsest even grid that has all angles of some tables."""
+    return math.lcm(*(table.half for table in tables))
+
+
+def common_grid(tables: Sequence[AirfoilTable]) -> Grid:
+    """Grid that has all angles and all Reynolds or Mach numbers of some tables."""
+    several = [table for table in tables if len(table.numbers) > 1]
+    if not several:
+        return Grid(common_half(tables), tuple(tables[0].knots), tables[0].range)
+    knots = np.unique(np.concatenate([table.numbers for table in several]))
+    return Grid(common_half(tables), tuple(knots), (float(knots[0]), float(knots[-1])))
+
+
+def cells(table: AirfoilTable, interpolation: str, grid: Grid | None = None) -> Array:
     """Coefficients of the interpolation in every cell of a table, for `sbs_sim.model.section`.
 
     Along the angle "smooth" is the monotone cubic of Fritsch and Carlson: its slope is continuous, and it rises or
@@ -442,10 +509,12 @@ def cells(table: AirfoilTable, interpolation: str) -> Array:
     table : AirfoilTable
     interpolation : str
         One of `INTERPOLATIONS`.
+    grid : Grid, optional
+        One that has all points of the table; its own if not given. Beyond its own numbers a table is constant.
 
     Returns
     -------
-    ndarray, shape ((len(table.knots) - 1) * cell_grid(table)[0], 16)
+    ndarray, shape ((len(grid.knots) - 1) * cell_grid(grid)[0], 16)
         c_00, c_01, c_02, c_03, c_10 ... of each cell. The angle runs fastest and covers -540..540 deg, so that a
         section angle minus an arctangent, -3 pi..3 pi, needs no wrapping.
 
@@ -453,16 +522,31 @@ def cells(table: AirfoilTable, interpolation: str) -> Array:
     ----------
     F. N. Fritsch, R. E. Carlson: Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17 (2), 1980.
     """
+    grid = common_grid([table]) if grid is None else grid
     lower, width, steps = table.knots[:-1, None], np.diff(table.knots)[:, None], table.intervals
+    finer = steps * (grid.half // table.half)
     parts = []
     for values in (table.cl, table.cd):
         powers = _polynomials(np.repeat(values, 2, axis=0) if len(values) == 1 else values, steps, interpolation)
-        if steps.max() > 1.0:
-            powers = _cut(powers, steps.astype(np.int64))
+        if finer.max() > 1.0:
+            powers = _cut(powers, finer.astype(np.int64))
         slope = np.diff(powers, axis=1) / width
-        parts += [powers[:, :-1] - lower * slope, slope]
+        parts += _between(table, np.array(grid.knots), powers, powers[:, :-1] - lower * slope, slope)
     rows = np.stack(parts, axis=-1).transpose(1, 2, 0, 3)
     return np.ascontiguousarray(np.tile(rows, (1, TURNS, 1, 1)).reshape(-1, 4 * (DEGREE + 1)))
+
+
+def _between(table: AirfoilTable, knots: Array, powers: Array, level: Array, slope: Array) -> list[Array]:
+    """Lines over the table's numbers as lines between other knots, which have all of them; constant beyond the ends."""
+    if np.array_equal(knots, table.knots) or len(table.numbers) == 1:
+        rows = np.zeros(len(knots) - 1, np.int64) if len(table.numbers) == 1 else slice(None)
+        return [level[:, rows], slope[:, rows]]
+    middles = 0.5 * (knots[1:] + knots[:-1])
+    rows = np.clip(np.searchsorted(table.numbers, middles) - 1, 0, len(table.numbers) - 2)
+    level, slope = level[:, rows], slope[:, rows]
+    for beyond, row in ((middles < table.numbers[0], 0), (middles > table.numbers[-1], -1)):
+        level[:, beyond], slope[:, beyond] = powers[:, row : row + 1 or None], 0.0
+    return [level, slope]
 
 
 def _polynomials(values: Array, steps: Array, interpolation: str) -> Array:
@@ -517,7 +601,7 @@ def _monotone_slopes(rise: Array, steps: Array) -> Array:
     return np.where(before * rise > 0.0, limited, 0.0)
 
 
-def cell_grid(table: AirfoilTable) -> tuple[int, float, float]:
+def cell_grid(table: AirfoilTable | Grid) -> tuple[int, float, float]:
     """Angle grid of `cells`.
 
     Returns

@@ -85,7 +85,7 @@ def by_blades(model: Model, width: int) -> Model:
     blades = aligned(len(registers), _widened(model.blades.dtype, width))
     elements = aligned((len(registers), model.elements.shape[1]), _widened(model.elements.dtype, width))
     knots = aligned((len(registers), model.knots.shape[1], width), float)
-    stall = aligned((len(registers), *model.stall.shape[1:3], width), float)
+    stall = aligned((len(registers), *model.stall.shape[1:-1], width), float)
     for r, register in enumerate(registers):
         _fill_register(model, register, blades[r], elements[r])
         for lane, number in enumerate(_with_copies(register)):

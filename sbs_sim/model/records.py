@@ -103,7 +103,6 @@ BLADE = {
     "first_alpha": LANES,  # of the airfoil table [rad]
     "inverse_alpha_step": LANES,
     "alpha_cells": LANES,  # cells of the table along the angle
-    "first_row": LANES,
     "min_number": LANES,
     "max_number": LANES,
     "quad": INTEGER,
@@ -144,6 +143,8 @@ ELEMENT = {
     "half_area": LANES,  # c ds / 2 [m^2]
     "lift_factor": LANES,
     "twist": LANES,
+    "first_row": LANES,  # of the airfoil table
+    "airfoil": LANES,  # number of the airfoil from the root outwards
     "number_scale": LANES,  # of the airfoil table over the airspeed: c / nu of Reynolds numbers, 1 / a of Mach numbers
 }
 # parts with tables in `shapes`: see `sbs_sim.model.surfaces`
@@ -285,13 +286,12 @@ class Model(NamedTuple):
     indices : StateIndices
     elements : structured ndarray, shape (tables, elements)
     knots : ndarray, shape (registers, knots, width)
-        Reynolds numbers of the airfoil table but for the first and the last; infinite where there are fewer.
+        Reynolds or Mach numbers of the airfoil tables but for the first and the last; infinite where there are fewer.
     table : ndarray, shape (cells, 16)
         Of every cell of the airfoil tables the coefficients of x^0 to x^3, each for lift and drag and for their slopes
-        over the Reynolds number, see `sbs_sim.model.airfoil.cells`.
-    stall : ndarray, shape (registers, 3, k, width)
-        Reynolds numbers, increasing, and the highest and lowest angle of attack [rad] at which the airfoil of a blade
-        is not stalled; filled up with copies of the last.
+        over the Reynolds or Mach number, see `sbs_sim.model.airfoil.cells`.
+    stall : ndarray, shape (registers, airfoils, 5, k, width)
+        See `Aircraft.stall_table`.
     surfaces, fuselages : structured ndarray, shapes (surfaces,), (fuselages,)
         Lifting surfaces, and a fuselage with tables or none.
     ramps : ndarray, shape (surfaces + fuselages, points, 5, n)

@@ -96,7 +96,7 @@ def _find_section(blade, element, knots, section, flow, pitch):
     inverse_airspeed = inverse_root(squared)
     airspeed = squared * inverse_airspeed
     alpha = pitch + element.twist - angle_of(u_p, u_t, inverse_airspeed)
-    cell = table_cell(blade, knots, airspeed * element.number_scale, alpha)
+    cell = table_cell(blade, element.first_row, knots, airspeed * element.number_scale, alpha)
     section.airspeed, section.number = airspeed, cell.number
     section.fraction, section.row = cell.fraction, cell.row
 
@@ -110,7 +110,7 @@ class TableCell(NamedTuple):
 
 
 @kernel
-def table_cell(blade, knots, number, alpha):
+def table_cell(blade, first_row, knots, number, alpha):
     """Cell at a Reynolds or Mach number and an angle of attack [rad]; a row for any values, NaN included."""
     number = minimum(maximum(number, blade.min_number), blade.max_number)
     position = (alpha - blade.first_alpha) * blade.inverse_alpha_step
@@ -118,7 +118,7 @@ def table_cell(blade, knots, number, alpha):
     position = select(position < 0.0, 0.0, position)
     position = select(position > cells, cells, position)  # NaN stays NaN ...
     column = select(position < cells, floor(position), cells - 1.0)  # ... in a cell of the table
-    row = blade.first_row + column
+    row = first_row + column
     for k in range(knots.shape[0]):
         row = row + select(number >= knots[k], cells, 0.0)
     return TableCell(row, position - column, number)

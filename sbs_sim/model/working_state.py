@@ -19,7 +19,7 @@ ADVANCE_RATIO, HOVER_INFLOW, DESCENT, FLOW, STALLED, REVERSED, OUTSIDE = range(7
 WORKING_SIZE = 7
 
 # rows of the stall angles
-NUMBER, HIGHEST, LOWEST = range(3)
+NUMBER, HIGHEST, LOWEST, LEAST, MOST = range(5)
 
 
 @entry
@@ -72,18 +72,27 @@ def disc_fractions(aircraft, blade, terms, angles):
         inverse_speed = inverse_root(squared)
         alpha = terms.pitch + element.twist - angle_of(up, ut, inverse_speed)
         number = squared * inverse_speed * element.number_scale
-        low, high = (
-            interpolated(angles[NUMBER], angles[LOWEST], number),
-            interpolated(angles[NUMBER], angles[HIGHEST], number),
-        )
+        low, high, least, most = limits(angles[0], number)
+        for k in range(1, angles.shape[0]):
+            is_outboard, own = element.airfoil >= float(k), limits(angles[k], number)
+            low, high = select(is_outboard, own[0], low), select(is_outboard, own[1], high)
+            least, most = select(is_outboard, own[2], least), select(is_outboard, own[3], most)
         backwards = ut <= 0.0
         attached = (alpha >= low) & (alpha <= high)
         area = area + part
         reversed_ = reversed_ + select(backwards, part, 0.0)
         stalled = stalled + select(backwards | attached, 0.0, part)
-        known = (number >= blade.min_number) & (number <= blade.max_number)
+        known = (number >= least) & (number <= most)
         outside = outside + select(known, 0.0, part)
     return stalled, reversed_, outside, area
+
+
+@kernel
+def limits(angles, number):
+    """Angles of attack between which an airfoil is not stalled, and numbers between which its table holds."""
+    low = interpolated(angles[NUMBER], angles[LOWEST], number)
+    high = interpolated(angles[NUMBER], angles[HIGHEST], number)
+    return low, high, angles[LEAST][0], angles[MOST][0]
 
 
 @kernel

@@ -382,7 +382,7 @@ def other_value(path, value):
     if path == ("body", "inertia"):
         return [[3.6, 0.0, -0.05], [0.0, 2.3, 0.0], [-0.05, 0.0, 5.4]]
     if isinstance(value, list):
-        return [item * 0.9 + 0.01 for item in value]
+        return value[1:] + value[:1] if isinstance(value[0], str) else [item * 0.9 + 0.01 for item in value]
     return value * 0.99 if value else 0.01
 
 
@@ -429,7 +429,8 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
     if path[2:3] == ("lag_damper",):
         data["rotors"][0]["lag_damper"] = {"c": 0.02, "d": 0.03}
     if path[-1] in ("stations", "values"):
-        data["rotors"][0][path[2]] = {"stations": [0.2, 0.6, 1.0], "values": [0.05, 0.04, 0.03]}
+        values = ["linear_573", "naca0012"] * 2 if path[2] == "outboard_airfoils" else [0.05, 0.04, 0.03]
+        data["rotors"][0][path[2]] = {"stations": [0.2, 0.6, 1.0], "values": values[:3]}
         aircraft, value = Aircraft.from_dict(data), get(data, path)
         everything, arrays = flattened(aircraft), model_arrays(aircraft)
     put(data, path, other_value(path, value))
@@ -571,6 +572,27 @@ REFUSED = {
         (*R0, "chord", "stations"),
         [0.0, 1.0],
         "rotors[0].chord: has root, tip, stations, allowed are root and tip, or stations and values",
+    ),
+    "airfoils of two lengths": (
+        (*R0, "outboard_airfoils"),
+        {"stations": [0.5, 0.8], "values": ["naca0015"]},
+        "rotors[0].outboard_airfoils.values: allowed are 2 names, one of each station, not 1",
+    ),
+    "airfoils that do not follow one another": (
+        (*R1, "outboard_airfoils"),
+        {"stations": [0.8, 0.5], "values": ["naca0015", "naca0012"]},
+        "rotors[1].outboard_airfoils.stations = [0.8, 0.5]: allowed are increasing numbers",
+    ),
+    "airfoils without stations": (
+        (*R1, "outboard_airfoils"),
+        {"values": ["naca0015"]},
+        "rotors[1].outboard_airfoils.stations: missing key",
+    ),
+    "airfoils over both axes": (
+        (*R1, "outboard_airfoils"),
+        {"stations": [0.8], "values": ["sc1095r8"]},
+        "rotors[1].outboard_airfoils.values[0] = 'sc1095r8': is over the Mach number, allowed are tables over the"
+        " Reynolds number as the one inboard",
     ),
     "a table without values": ((*R1, "chord"), {"stations": [0.0, 1.0]}, "rotors[1].chord.values: missing key"),
     "no twist": ((*R0, "twist_deg"), {}, "rotors[0].twist_deg: missing key"),
@@ -997,21 +1019,44 @@ def test_a_partial_airfoil_is_extended_for_the_blades_of_each_rotor(tmp_path):
     for rotor in data["rotors"]:
         rotor["airfoil"] = "wing"
     same = Aircraft.from_dict(data, tmp_path)
-    assert same.tables[0] is same.tables[1]
+    assert same.sections[0][0] is same.sections[1][0]
     data["rotors"][1]["radius"] = 1.0
     for aircraft in (Aircraft.from_dict(data, tmp_path), same.with_value("rotors[1].radius", 1.0)):
-        broadside = [table.cd[0, 3 * (len(table.alpha) - 1) // 4] for table in aircraft.tables]
+        broadside = [table.cd[0, 3 * (len(table.alpha) - 1) // 4] for (table,) in aircraft.sections]
         assert broadside == pytest.approx([1.11 + 0.018 * 0.505 / 0.051, 1.11 + 0.018 * 1.0 / 0.051])
         assert aircraft.parameter_hash == Aircraft.from_dict(data, tmp_path).parameter_hash
         assert list(aircraft.airfoils) == ["wing"]
     # what flies has both: across the wind, with a blade of any pitch, the drag of each
     model = aircraft.model()
-    first, columns = model.blades["first_row"][::3, 0], int(model.blades["alpha_cells"][0, 0])
+    first, columns = model.elements["first_row"][:, 0, 0], int(model.blades["alpha_cells"][0, 0])
     quarter = columns // 12 + columns // 2  # cell that begins at 90 deg, of three turns
     drag = [model.table[int(row) + quarter] for row in first]  # c_02 and c_03: of x^0, and its slope over Re
     assert [row[2] + 1e5 * row[3] for row in drag] == pytest.approx(broadside)
     copied, files = aircraft.files()
     assert [rotor["airfoil"] for rotor in copied["rotors"]] == list(files) * 2
+
+
+def test_airfoils_along_the_blade_count_and_travel_with_the_aircraft(sbs, tmp_path):
+    """The element at the middle of which another airfoil has begun is the first that has it; files hold each once."""
+    span = {"stations": [0.5, 0.9], "values": ["linear_573", "naca0012"]}
+    aircraft = sbs.with_value("rotors[0].outboard_airfoils", span)
+    names = [table.name for table in aircraft.sections[0]]
+    assert names == ["naca0012", "linear_573", "naca0012"]
+    radii = (0.075 + 0.43 * (np.arange(20) + 0.5) / 20) / 0.505
+    assert [names[k] for k in aircraft.model().elements["airfoil"][0, :, 0].astype(int)] == [
+        "naca0012" if radius < 0.5 or radius >= 0.9 else "linear_573" for radius in radii
+    ]
+    assert aircraft.parameter_hash != sbs.parameter_hash
+    moved = aircraft.with_value("rotors[0].outboard_airfoils.stations", [0.5, 0.8])
+    assert moved.parameter_hash != aircraft.parameter_hash
+    data, files = aircraft.files()
+    assert sorted(files) == ["0_linear_573.csv", "1_naca0012.csv"]
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
+    assert Aircraft.from_dict(data, tmp_path).parameter_hash == aircraft.parameter_hash
+    with pytest.raises(AircraftError) as caught:
+        sbs.with_value("rotors[1].outboard_airfoils", {"stations": [0.5], "values": ["none"]})
+    assert ": rotors[1].outboard_airfoils.values[0] = 'none': allowed are a file's path or" in str(caught.value)
 
 
 def test_another_airfoil_is_read(sbs):

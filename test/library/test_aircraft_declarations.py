@@ -87,6 +87,7 @@ def test_every_field_is_declared(record):
 def test_every_declaration_is_complete(path):
     declaration = EVERY[path]
     has_own_units = path in ("controls", "body.stand.free", "drives.rotors", "drives.free_wheel")
+    has_own_units |= path == "rotors.outboard_airfoils.values"
     is_text = (
         has_own_units
         or declaration.schema.get("type") == "string"

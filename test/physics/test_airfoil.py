@@ -17,6 +17,8 @@ from sbs_sim.model.airfoil import (
     AirfoilTable,
     cell_grid,
     cells,
+    common_grid,
+    common_half,
     extend_polar,
     interpolate,
     read_table,
@@ -39,7 +41,7 @@ DEG = math.pi / 180
 def _look_up(like, blades, knots, table, given, out):
     blade = as_records(blades)[0]
     values, found = as_lanes(given, as_records(like)), as_lanes(out, as_records(like))
-    cell = table_cell(blade, as_lanes(knots, blade), values[0], values[1])
+    cell = table_cell(blade, 3.0, as_lanes(knots, blade), values[0], values[1])
     lift, lift_slope, drag, drag_slope = table_row(table, cell.row, cell.fraction, DEGREE)
     found[0], found[1] = lift + lift_slope * cell.number, drag + drag_slope * cell.number
     found[2], found[3] = cell.row, cell.fraction
@@ -60,7 +62,6 @@ class Reader:
             "first_alpha": first_angle,
             "inverse_alpha_step": inverse_step,
             "alpha_cells": columns,
-            "first_row": 3.0,
         }
         values |= {"min_number": table.numbers[0], "max_number": table.numbers[-1]}
         for name, value in values.items():
@@ -331,6 +332,14 @@ def test_goettingen429_has_the_published_slope_and_mean_drag():
     assert interpolate(table, 2e6, math.pi / 2)[1] == pytest.approx(1.11 + 0.018 * 14.6, abs=1e-9)
 
 
+def test_naca0015_lifts_as_castles_and_gray_measured():
+    """NACA TN 2474: slopes of 5.9 and 6.07 /rad at Mach 0.248 and 0.33; Prandtl and Glauert take them to Mach 0."""
+    table = read_table(AIRFOILS / "naca0015.csv", 10.0)
+    for reynolds, mach, measured in [(256e3, 0.248, 5.9), (341e3, 0.33, 6.07)]:
+        assert slope(table, reynolds, 8.0) == pytest.approx(measured * math.sqrt(1 - mach**2), rel=0.03)
+    np.testing.assert_array_equal(table.cl, -table.cl[:, ::-1])
+
+
 # --- Look-up --------------------------------------------------------------------------------------
 
 
@@ -531,6 +540,26 @@ def test_a_table_without_numbers_is_read(tmp_path):
     assert interpolate(table, 1e5, 5 * DEG)[0] == pytest.approx(0.5, abs=1e-12)
 
 
+@pytest.mark.parametrize("interpolation", ["smooth", "linear"])
+def test_tables_on_a_common_grid_have_their_own_values(interpolation):
+    """What a table gives on the grid of several is what it gives on its own, and constant beyond its own numbers."""
+    tables = uneven_table(), TABLES["linear_573"], uneven_table(np.array([0.1, 0.6])), uneven_table(np.array([0.4]))
+    grid = common_grid([tables[0], *tables[2:]])
+    assert grid == (360, (0.0, 0.1, 0.3, 0.5, 0.6, 0.75), (0.0, 0.75))
+    width = np.pi / grid.half
+    for table in (tables[0], *tables[2:]):
+        rows = cells(table, interpolation, grid).reshape(len(grid.knots) - 1, -1, 4, 4)
+        for i, mach in enumerate([0.05, 0.2, 0.4, 0.55, 0.7]):
+            for alpha in (-2.0, -0.21, 0.137, 3.0):
+                column = int((alpha + np.pi) / width)
+                powers = ((alpha + np.pi) / width - column) ** np.arange(4)
+                lift, lift_slope, drag, drag_slope = powers @ rows[i, column]
+                expected = interpolate(table, mach, alpha, interpolation)
+                assert (lift + lift_slope * mach, drag + drag_slope * mach) == pytest.approx(expected, abs=1e-11)
+    assert common_grid([tables[0]]).half == 360
+    assert common_half(tables[:2]) == 360
+
+
 def test_stall_angles_of_uneven_tables_are_those_of_the_points():
     highest, lowest = stall_angles(uneven_table())
     assert np.all(highest / DEG == pytest.approx(np.full(4, 40.0)))
@@ -625,8 +654,7 @@ BAD_ROWS = {
     ),
     "uneven without a common step": (
         [*block(1e5, [-10, -5, 1.002, 2]), *block(2e5, [-10, -5, 1.002, 2])],
-        "5: alpha_deg 1.002 must be a multiple of a step that divides 180, that all angles have, and that is 0.05"
-        " or more",
+        "5: alpha_deg 1.002 must be a multiple of 0.05, as angles that are uneven or whose step does not divide 180",
     ),
     "coarse beside 30 deg": (
         [*block(1e5, [-40, -20, 0, 10]), *block(2e5, [-40, -20, 0, 10])],

@@ -160,6 +160,13 @@ AIRCRAFT = {
         "rotors": [{"airfoil": "sc1095r8"}, {"airfoil": "goettingen429"}],
         "options": {"interpolation": "smooth"},
     },
+    "airfoils_along_the_span": {
+        "environment": {"speed_of_sound": 150.0},
+        "rotors": [
+            {"outboard_airfoils": {"stations": [0.4, 0.75], "values": ["linear_573", "goettingen429"]}},
+            {"airfoil": "goettingen429", "outboard_airfoils": {"stations": [0.6], "values": ["sc1095r8"]}},
+        ],
+    },
     "central_hinges": {"every_rotor": {"hinge_offset": 0.0, "flap_hinge_offset": 0.0}},
     "vacuum": {"environment": {"air_density": 0.0}, "every_rotor": ODD_BLADE},
     "surfaces_and_fuselage": {"body": PARTS, "rotors": TILTED},

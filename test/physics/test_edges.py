@@ -246,11 +246,11 @@ def test_a_table_that_is_extended_is_stalled_beyond_its_end(tmp_path, last, aspe
 
 def test_a_dented_airfoil_does_not_stall_in_hover(sbs, hover):
     """The default one with a dent of a millionth at 4.5 deg, of which more than half of the disc sees more."""
-    table = sbs.tables[0]
+    table = sbs.sections[0][0]
     cl, zero = table.cl.copy(), len(table.alpha) // 2
     for side in (1, -1):
         cl[:, zero + 9 * side] = cl[:, zero + 8 * side] - side * 1e-6
-    dented = dataclasses.replace(sbs, tables=(dataclasses.replace(table, cl=cl),) * len(sbs.rotors))
+    dented = dataclasses.replace(sbs, sections=((dataclasses.replace(table, cl=cl),),) * len(sbs.rotors))
     assert [state.stalled_share for state in states(hovering(dented, hover).snapshot())] == [0.0, 0.0]
 
 
@@ -370,6 +370,21 @@ def test_reynolds_numbers_that_the_table_does_not_have_are_told(sbs):
         shares = [state.outside_share for state in states(hovering(viscous, point).snapshot())]
         assert all(least <= share <= most for share in shares), shares
         assert (line in point.warnings) == (least > 0.1)
+
+
+def test_of_airfoils_along_the_span_each_has_its_own_numbers_and_its_own_stall(sbs, tmp_path):
+    """An outboard table of Reynolds numbers that no section has is missed by its share of the disc alone."""
+    rows = [f"{reynolds},{angle},{0.1 * angle},0.02" for reynolds in (2e6, 4e6) for angle in range(-2, 3)]
+    (tmp_path / "fast.csv").write_text("\n".join(["reynolds,alpha_deg,cl,cd", *rows]) + "\n")
+    outboard = {"stations": [0.8], "values": [str(tmp_path / "fast.csv")]}
+    mixed = sbs.with_value("rotors[0].outboard_airfoils", outboard)
+    left, right = states(hovering(mixed, trim(sbs)).snapshot())
+    share = (1 - 0.8**2) * 0.505**2 / (0.505**2 - 0.075**2)
+    assert left.outside_share == pytest.approx(share, abs=0.05)  # in steps of an element
+    assert left.stalled_share == pytest.approx(share, abs=0.05)  # beyond 2 deg
+    assert (right.outside_share, right.stalled_share) == (0.0, 0.0)
+    line = "MR1: Reynolds number outside those of the airfoil tables, on more than 10% of the disc"
+    assert line in warnings(mixed, hovering(mixed, trim(sbs)).snapshot().working)
 
 
 def test_of_a_table_over_the_mach_number_its_range_counts_and_the_speed_of_sound_is_physics(sbs, tmp_path):

@@ -24,10 +24,10 @@ STALL = np.array([[2e4, 5e4, 1.2e5, 1.9e5], [0.02, 0.16, 0.06, 0.2], [-0.02, -0.
 def working(model):
     """Working states of the last derivative with the angles of STALL, shape (n_rotors, WORKING_SIZE)."""
     engine = model.engine
-    blades = engine.model.blades.copy()
-    blades["min_number"], blades["max_number"] = STALL[0, 0], STALL[0, -1]
-    stall = np.broadcast_to(STALL[..., np.newaxis], (len(blades), *STALL.shape, blades["rotor_speed"].shape[-1]))
-    known = engine.model._replace(blades=blades, stall=stall.copy())
+    blades, ends = engine.model.blades, np.broadcast_to(STALL[0, [0, -1], np.newaxis], (2, STALL.shape[1]))
+    rows = np.concatenate([STALL, ends])[..., np.newaxis]
+    stall = np.broadcast_to(rows, (len(blades), 1, *rows.shape[:-1], blades["rotor_speed"].shape[-1]))
+    known = engine.model._replace(stall=stall.copy())
     out = engine.memory(len(model.speeds), WORKING_SIZE)
     working_state(known, engine.work, out)
     return out[..., 0]

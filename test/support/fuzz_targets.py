@@ -26,6 +26,8 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from sbs_sim import Aircraft, LinearModel, Simulation, linearize, simulate, sweep, trim
+from sbs_sim.aircraft.airfoil_files import read_airfoil
+from sbs_sim.aircraft.airfoil_files.table import table_of
 from sbs_sim.analysis.batch import Case, simulate_batch
 from sbs_sim.analysis.monte_carlo import gust_cases
 from sbs_sim.cockpit.recorded_snapshots import RecordedSnapshots
@@ -622,6 +624,9 @@ def check_airfoil(data: bytes) -> None:
             table = read_table(folder / "a.csv", 8.0)
             assert all(np.isfinite(values).all() for values in (table.numbers, table.alpha, table.cl, table.cd))
             assert (table.cd > 0).all()
+        with refusing():
+            table, _ = table_of("a", read_airfoil(folder / "a.csv").polars, "viterna", 8.0)
+            assert all(np.isfinite(values).all() for values in (table.numbers, table.alpha, table.cl, table.cd))
 
 
 CSV_PIECES = (
@@ -648,6 +653,39 @@ def _small_airfoil() -> bytes:
         f"{re},{angle},{0.1 * angle},{0.01 + 1e-4 * angle * angle}" for re in (1e5, 1e6) for angle in range(-10, 11, 5)
     ]
     return "\n".join(rows).encode()
+
+
+AIRFOILS = (
+    _small_airfoil(),
+    b"""C81                            2 4 2 3 0 0
+           0.0    0.5
+-180.00 0.0000 0.0000
+   0.00 0.1000 0.2000
+  10.00 1.0000 1.1000
+ 180.00 0.0000 0.0000
+           0.0    0.9
+-180.00 0.0200 0.0200
+   0.00 0.0100 0.0200
+ 180.00 0.0200 0.0200
+""",
+    b""" Calculated polar for: W
+ 1 1 Reynolds number fixed          Mach number fixed
+ Mach =   0.000     Re =     0.500 e 6     Ncrit =   9.000
+   alpha    CL        CD       CDp       CM
+  ------ -------- --------- --------- --------
+  -5.000  -0.4442   0.00802   0.00175  -0.0533
+   0.000   0.0442   0.00702   0.00175  -0.0533
+   5.000   0.5697   0.00842   0.00220  -0.0526
+""",
+    b"""0.75 Re
+5 NumAlf
+-180 0 0.02
+-7.62 -0.5 0.01
+0 0.1 0.01
+7.11 0.6 0.01
+180 0 0.02
+""",
+)
 
 
 def _small_log() -> bytes:
@@ -1000,7 +1038,7 @@ FUZZ_TARGETS = (
     FuzzTarget("joystick file, axes", JOYSTICKS, check_joystick, 2.0),
     FuzzTarget("aircraft file, bytes", mutated(YAML_TEXTS, PIECES), check_yaml, 2.0),
     FuzzTarget("aircraft file, values", st.lists(st.tuples(PATHS, ANYTHING), max_size=3), check_yaml_values, 2.0),
-    FuzzTarget("airfoil file", mutated([AIRFOIL, _small_airfoil(), _small_airfoil()], CSV_PIECES), check_airfoil, 2.0),
+    FuzzTarget("airfoil file", mutated([AIRFOIL, *AIRFOILS], CSV_PIECES), check_airfoil, 2.0),
     FuzzTarget("log, bytes", mutated([SMALL_LOG]), check_log, 0.6),
     FuzzTarget("log, contents", foreign_logs(), check_foreign, 0.5),
     FuzzTarget("command lines", command_lines(), check_command, 2.0),

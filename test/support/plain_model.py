@@ -425,6 +425,15 @@ def along_blade(rotor, name, s):
     return first + (last - first) * (share - inner) / (outer - inner)
 
 
+def airfoil_at(rotor, radius):
+    """Return the name of the airfoil at a share of the radius: the last one that begins inboard of it."""
+    name = rotor.airfoil
+    if getattr(rotor, "outboard_stations", None) is not None:
+        for station, outboard in zip(rotor.outboard_stations, rotor.outboard_airfoils, strict=True):
+            name = outboard if radius >= station else name
+    return name
+
+
 def hinge_pitch(blade, swash):
     """Return the pitch at the hinge [rad] and its rate [rad/s] while the swashplate stands still (section 4.5)."""
     rotor, swing = blade.rotor, blade.azimuth + blade.rotor.swashplate_phase
@@ -473,7 +482,7 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
         u_p = velocity @ blade.n + induced * np.cos(blade.flap)
         # The section sees the flow across the span only: |V| is the speed in the plane of t and n.
         speed = np.hypot(u_t, u_p)
-        airfoil = ac.airfoils[rotor.airfoil]
+        airfoil = ac.airfoils[airfoil_at(rotor, (rotor.hinge_offset + s) / rotor.radius)]
         cl, cd = airfoil_coefficients(
             airfoil,
             speed / air.speed_of_sound if airfoil.axis == "mach" else speed * chord / air.kinematic_viscosity,

@@ -238,6 +238,9 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
             f">= {rotor.first_moment * rotor.blade_cg:.6g}, blade_mass blade_cg^2",
         ),
     ]
+    relations += [
+        (rotor.duct_exit is None or rotor.duct_expansion == 0.5, "duct_expansion", "0.5, with duct.exit_area"),
+    ]
     factors = rotor.lag_damping_factors
     relations += [
         (len(factors) == rotor.blades, "blade_lag_damping", f"a list of {rotor.blades}, one of each blade"),
@@ -248,6 +251,9 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
     if rotor.damper_damping > 0.0 and _damper_length(rotor) < MIN_LENGTH:
         allowed = "0 where both ends of the damper are in one place"
         problems.append(f"lag_damper.damping = {rotor.damper_damping}: allowed is {allowed}")
+    of_duct = (rotor.duct_turning, rotor.ram_recovery, rotor.lip_arm, rotor.lip_stall)
+    if rotor.duct_exit is None and of_duct != (1.0, 1.0, 0.0, None):
+        problems.append("duct.exit_area: missing; allowed is 0.25 to 4")
     problems += _range_problems("collective_range_deg", rotor.collective_range)
     return problems + _range_problems("cyclic_range_deg", rotor.cyclic_range)
 

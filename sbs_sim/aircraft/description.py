@@ -534,6 +534,50 @@ class Rotor(ByContent):
     duct_expansion: float = number(
         "Wake expansion ratio of the duct; 0.5 is an open rotor", 0.25, 2, symbol="a_w", model_field="duct_expansion"
     )
+    duct_exit: float | None = number(
+        "Exit area over that of the disc of a duct with a fixed exit; without it there is no such duct",
+        0.25,
+        4,
+        key="duct.exit_area",
+        symbol="a_w",
+        default=None,
+    )
+    duct_turning: float = number(
+        "Share of the velocity along the disc that the lip turns into the duct",
+        0,
+        1,
+        key="duct.turning",
+        symbol="t",
+        default=1.0,
+    )
+    ram_recovery: float = number(
+        "Share of the dynamic pressure of what the lip turns that is not lost there",
+        0,
+        1,
+        key="duct.ram_recovery",
+        symbol=r"\eta_r",
+        model_field="ram_recovery",
+        default=1.0,
+    )
+    lip_arm: float = number(
+        "Height above the disc at which the ram drag acts",
+        -50,
+        50,
+        "m",
+        key="duct.lip_arm",
+        symbol="h_l",
+        model_field="lip_arm",
+        default=0.0,
+    )
+    lip_stall: float | None = number(
+        "Velocity along the disc over the flow through it at which the stalled lip recovers half; without it, it never"
+        " stalls",
+        0.01,
+        1000,
+        key="duct.lip_stall",
+        symbol="s_l",
+        default=None,
+    )
     induced_power_factor: float = number(
         "Induced velocity at the blades over that of momentum theory: 1.1 to 1.2 for the tip loss and the uneven inflow"
         " of a real rotor, 1 for the ideal one",
@@ -549,6 +593,11 @@ class Rotor(ByContent):
     )
     mixing: dict[str, dict[str, float]] = _mixing()
     swashplate_offset: Array = _offsets()
+
+    @property
+    def wake_expansion(self) -> float:
+        """a_w: area of the wake far behind over that of the disc, in hover."""
+        return self.duct_expansion if self.duct_exit is None else self.duct_exit
 
     @property
     def blade_length(self) -> float:

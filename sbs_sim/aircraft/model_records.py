@@ -106,6 +106,7 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["axial_dampers"] = any(rotor.damper_damping > 0.0 for rotor in aircraft.rotors)
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
     switches["stand"] = aircraft.body.is_stand
+    switches["ducts"] = any(rotor.duct_exit is not None for rotor in aircraft.rotors)
     return switches
 
 
@@ -159,6 +160,7 @@ def _blade_values(aircraft: "Aircraft", rotor: Rotor, number: int, grid: Grid) -
         "damper_damping": factor * rotor.damper_damping,
         "rotor_speed": _kept_speed(aircraft, rotor),
         "inflow_speed": rotor.induced_power_factor * rotor.speed,
+        "duct_turning": _turning(rotor),
         "axes": hub_axes(rotor.shaft_direction),
         "lag_hinge_offset": rotor.hinge_offset - rotor.flap_hinge_offset,
         "first_moment": rotor.first_moment,
@@ -198,6 +200,11 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
             "inverse_tip_speed": 1.0 / tip_speed,
             "coefficient_scale": 1.0 / pressure if density > MIN_DENSITY else 0.0,
             "inverse_blades": 1.0 / rotor.blades,
+            "duct_expansion": rotor.wake_expansion,
+            "duct": rotor.duct_exit is not None,
+            "duct_turning": _turning(rotor),
+            "inverse_lip_stall": 0.0 if rotor.lip_stall is None else 1.0 / rotor.lip_stall,
+            "momentum_scale": math.pi * (rotor.radius * rotor.radius) * (tip_speed * tip_speed),
         }
         _set(rotors[j], values)
         integers = {
@@ -236,6 +243,11 @@ def gear(aircraft: "Aircraft", rotor: Rotor) -> float:
 def _kept_speed(aircraft: "Aircraft", rotor: Rotor) -> float:
     """Speed of a rotor that does not change; 0 for one whose speed is a state."""
     return rotor.speed if drive_of(aircraft, rotor) < 0 else 0.0
+
+
+def _turning(rotor: Rotor) -> float:
+    """Share of the velocity along the disc that a duct turns; 0 without one."""
+    return 0.0 if rotor.duct_exit is None else rotor.duct_turning
 
 
 def _drives(aircraft: "Aircraft") -> NDArray[Any]:

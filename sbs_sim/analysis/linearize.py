@@ -107,6 +107,8 @@ def linearize_trim(
     checks.instance("point", point, TrimPoint, LinearizationError)
     if method == "paper" and aircraft.drives:
         raise LinearizationError("method = 'paper': allowed with drives is averaged")
+    if method == "paper" and any(rotor.duct_exit is not None for rotor in aircraft.rotors):
+        raise LinearizationError("method = 'paper': allowed with ducts of a fixed exit is averaged")
     if point.parameter_hash != aircraft.parameter_hash:
         raise LinearizationError("point: allowed is a trim of this aircraft, it is one of another")
     model = _averaged(aircraft, point, step_scale)

@@ -100,7 +100,7 @@ class MomentumRotor:
         self.upward = max(0.0, float(self._axes[2, 2]))
         self._density = max(aircraft.environment.air_density, MIN_DENSITY)
         # thrust is this times the induced velocity times the flow through the disc, eq. (6.1)
-        self._mass_flow = self._density * self.area / (2 * rotor.duct_expansion**2)
+        self._mass_flow = self._density * self.area / (2 * rotor.wake_expansion**2)
         number = 0.75 * self.tip_speed * float(number_scale(aircraft, j, rotor.mean_chord))
         curve = _lift_curve(aircraft.table_at(j, 0.75), number)
         self._sum_sections(rotor, rotor.elements(aircraft.options.elements), *curve)

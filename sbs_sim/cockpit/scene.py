@@ -120,7 +120,7 @@ class Scene:
 
     def has_duct(self, rotor: Rotor) -> bool:
         """True if a rotor is drawn with a duct: one that carries load, or the file's words, for it may carry none."""
-        return rotor.duct_expansion != OPEN_ROTOR or "duct" in self.aircraft.description.lower()
+        return rotor.wake_expansion != OPEN_ROTOR or "duct" in self.aircraft.description.lower()
 
     @property
     def cell(self) -> float:

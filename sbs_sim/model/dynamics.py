@@ -25,6 +25,7 @@ from sbs_sim.lanes import (
     cross,
     dot,
     rounded,
+    select,
     spread,
     transposed,
 )
@@ -45,10 +46,10 @@ from sbs_sim.model.blade import (
     to_blade,
     with_axial_damper,
 )
-from sbs_sim.model.duct import duct_thrust
+from sbs_sim.model.duct import duct_flow, duct_thrust, sheltered
 from sbs_sim.model.frames import quaternion_rates, rotation, shaft_down
 from sbs_sim.model.fuselage import plate_drag
-from sbs_sim.model.inflow import Inflow, disc_flow, inflow_rates
+from sbs_sim.model.inflow import INVERSE_MASS, Inflow, disc_flow, inflow_rates
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
 from sbs_sim.model.section import section_loads
@@ -253,7 +254,10 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
         hub = hub_motion(blade, flight)
         motion = blade_motion(blade, basis, pose, hub.omega)
         induced, gradient = induced_velocity(aircraft, memory.state, blade, pose)
-        flow = section_flow(blade, basis, motion, hub.air_velocity, induced, gradient)
+        air_velocity = hub.air_velocity
+        if aircraft.switches[0].ducts == 1:
+            air_velocity = sheltered(blade.duct_turning, air_velocity)
+        flow = section_flow(blade, basis, motion, air_velocity, induced, gradient)
         pitch = blade_pitch(aircraft, blade, pose, swash)
         elements = aircraft.elements[blade.elements]
         loads = section_loads(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, pitch)
@@ -451,10 +455,8 @@ def body_loads(aircraft, memory, flight):
     force = drag - cross(omega, cross(omega, body.first_moment))
     moment = -cross(omega, body.inertia @ omega)
     for j in range(aircraft.rotors.shape[0]):
-        rotor = aircraft.rotors[j]
-        duct = rotor.axes @ Vector(0.0, 0.0, -duct_thrust(rotor.duct_expansion, memory.totals[j].thrust))
-        force = force + duct
-        moment = moment + cross(rotor.hub, duct)
+        duct = duct_load(aircraft, memory, j)
+        force, moment = force + duct.force, moment + duct.moment
     for i in range(aircraft.surfaces.shape[0]):
         surface, ramps = aircraft.surfaces[i], aircraft.ramps[i]
         wash = wash_at(aircraft, memory, surface, ramps)
@@ -465,6 +467,25 @@ def body_loads(aircraft, memory, flight):
         wash = wash_at(aircraft, memory, fuselage, ramps)
         load = fuselage_load(air.density, fuselage, aircraft.shapes, flight.air_velocity, omega, wash)
         force, moment = force + load.force, moment + load.moment
+    return ForceMoment(force, moment)
+
+
+@kernel
+def duct_load(aircraft, memory, j):
+    """Force and moment about the c.g. of the duct around a rotor, body axes, eq. (5.12) or (6.11)."""
+    rotor = aircraft.rotors[j]
+    force = rotor.axes @ Vector(0.0, 0.0, -duct_thrust(rotor.duct_expansion, memory.totals[j].thrust))
+    moment = cross(rotor.hub, force)
+    if aircraft.switches[0].ducts == 1:
+        mu = memory.flow[j].velocity * rotor.inverse_tip_speed
+        flow = duct_flow(rotor, memory.state[rotor.inflow + S.UNIFORM], mu)
+        scale = aircraft.air[0].density * rotor.momentum_scale
+        drag = scale * flow.mass_flow * rotor.duct_turning
+        with_exit = rotor.axes @ Vector(-(drag * mu.x), -(drag * mu.y), -(scale * flow.duct))
+        at_lip = rotor.axes @ Vector(-(drag * mu.x), -(drag * mu.y), 0.0)
+        up = shaft_down(rotor.axes) * -rotor.lip_arm
+        force = with_exit * rotor.duct + force * (1.0 - rotor.duct)
+        moment = (cross(rotor.hub, with_exit) + cross(up, at_lip)) * rotor.duct + moment * (1.0 - rotor.duct)
     return ForceMoment(force, moment)
 
 
@@ -806,7 +827,13 @@ def set_inflow_rates(aircraft, memory, j, dx):
         rounded(total.cosine_moment * moment_scale),
         rounded(total.sine_moment * moment_scale),
     )
-    flow = disc_flow(x[uniform], mu, rotor.sense)
+    if aircraft.switches[0].ducts == 1:
+        flow = disc_flow(x[uniform], sheltered(rotor.duct_turning, mu), rotor.sense)
+    else:
+        flow = disc_flow(x[uniform], mu, rotor.sense)
     states = Inflow(x[uniform], x[cosine], x[sine])
     rates = inflow_rates(rotor, states, flow, loads, aircraft.switches[0].cyclic_inflow)
     dx[uniform], dx[cosine], dx[sine] = rates.uniform, rates.cosine, rates.sine
+    if aircraft.switches[0].ducts == 1:
+        ducted = rotor.inflow_speed * INVERSE_MASS * (loads.uniform - duct_flow(rotor, x[uniform], mu).rotor)
+        dx[uniform] = select(rotor.duct > 0.0, ducted, rates.uniform)

@@ -42,6 +42,7 @@ SWITCHES = {
     "complete_hub_moment": INTEGER,
     "axial_dampers": INTEGER,  # 1 where a rotor has them
     "stand": INTEGER,
+    "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
 }
 ROTOR = {
     "rotor_speed": LANES,  # Omega; 0 where a drive turns the rotor, whose speed is a state
@@ -51,7 +52,13 @@ ROTOR = {
     "sense": LANES,  # G, +1 counter-clockwise seen from above
     "hub": VECTOR,
     "axes": MATRIX,  # hub axes as columns in body components
-    "duct_expansion": LANES,  # a_w
+    "duct_expansion": LANES,  # a_w, of a duct with a fixed exit its exit area over that of the disc
+    "duct": LANES,  # 1 for a duct with a fixed exit
+    "duct_turning": LANES,  # t
+    "ram_recovery": LANES,
+    "inverse_lip_stall": LANES,  # 0 where the lip never stalls
+    "lip_arm": LANES,  # height above the disc at which the ram drag acts [m]
+    "momentum_scale": LANES,  # pi R^2 (Omega R)^2 [m^4/s^2]
     "inverse_tip_speed": LANES,
     "coefficient_scale": LANES,  # of C_T: 1 / (rho pi R^2 (Omega R)^2), 0 in vacuum
     "inverse_blades": LANES,  # 1 / N_b
@@ -69,6 +76,7 @@ ROTOR = {
 BLADE = {
     "rotor_speed": LANES,
     "inflow_speed": LANES,  # kappa_i Omega of the file
+    "duct_turning": LANES,  # t
     "sense": LANES,
     "radius": LANES,
     "hub": VECTOR,

@@ -150,6 +150,39 @@ def test_momentum_theory_in_axial_flight(sbs, climb):
     np.testing.assert_allclose(point.power, point.torque * [rotor.speed for rotor in sbs.rotors], rtol=1e-12)
 
 
+@pytest.mark.parametrize("climb", [-2.0, 0.0, 5.0])
+@pytest.mark.parametrize("exit_area", [0.7, 1.0])
+def test_a_duct_with_a_fixed_exit_keeps_mass_momentum_and_energy(exit_area, climb):
+    """T = m w for rotor and duct together, and the rotor's power T_r (V + v) is m ((V + w)^2 - V^2) / 2."""
+    aircraft = build(every_rotor={"duct": {"exit_area": exit_area}}, body={"flat_plate_areas": [0.0, 0.0, 0.0]})
+    point, rotor = trim(aircraft, climb_rate=climb), aircraft.rotors[0]
+    through = point.state[point.state_names.index("lambda0(1)")] * tip_speed(rotor) + climb
+    mass_flow = RHO * disc_area(rotor) * through
+    gained = through / exit_area - climb
+    assert mass_flow * gained == pytest.approx(aircraft.body.mass * G / 2, rel=1e-6)
+    power = mass_flow * ((climb + gained) ** 2 - climb**2) / 2
+    assert point.thrust[0] * through == pytest.approx(power, rel=1e-6)
+    if exit_area == 1.0 and climb == 5.0:  # T (V + w/2), w = v = 7.95 m/s by T = rho A (V + v) v
+        assert 2 * power == pytest.approx(1815.0, rel=1e-3)
+
+
+def test_a_duct_in_forward_flight_has_ram_drag_and_lifts_the_nose():
+    """All of the flow along the disc is turned: its drag is m V, which acts at the lip."""
+    velocity, arm = 10.0, 0.2
+    rates = []
+    for duct in ({"turning": 0.0}, {"turning": 0.0, "lip_arm": arm}, {}, {"lip_arm": arm}):
+        model = Model(build(every_rotor={"duct": {"exit_area": 1.0, **duct}}))
+        x = model.state(lambda0=0.05)
+        x[S.VELOCITY] = velocity
+        rates.append(model.derivative(x, [[0.0, 0.0, 0.0]] * 2))
+    rotor = model.aircraft.rotors[0]
+    drag = 2 * RHO * disc_area(rotor) * 0.05 * tip_speed(rotor) * velocity
+    np.testing.assert_array_equal(rates[1], rates[0])
+    moment = rates[3][S.RATES + 1] - rates[2][S.RATES + 1]
+    assert moment == pytest.approx(arm * drag / model.aircraft.body.inertia[1, 1], rel=0.3)  # blades turn along
+    assert moment > 0.0
+
+
 @pytest.mark.parametrize(("climb", "factor"), [(0.0, 1.0), (5.0, 1.0), (0.0, 1.15), (5.0, 1.15)])
 def test_power_in_axial_flight_is_induced_climb_and_profile(tmp_path, climb, factor):
     """P = T (kappa_i v + V_c) + 3 Int 1/2 rho c cd |V|^3 dr, constant cd; flap and lag of 1 deg change it by 0.1 %.

@@ -354,6 +354,7 @@ OPTIONAL = {
     "lag_rest_deg",
     "blade_lag_damping",
     "lag_damper",
+    "duct",
     "stations",
     "values",
 }
@@ -428,6 +429,10 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
         assert path[:3] == ("rotors", 0, "mixing") or OPTIONAL & set(path), "a key that sbs.yaml does not show"
     if path[2:3] == ("lag_damper",):
         data["rotors"][0]["lag_damper"] = {"c": 0.02, "d": 0.03}
+    if path[2:3] == ("duct",):
+        data["rotors"][0]["duct"] = {"exit_area": 0.9}
+        aircraft, value = Aircraft.from_dict(data), 0.9
+        everything, arrays = flattened(aircraft), model_arrays(aircraft)
     if path[-1] in ("stations", "values"):
         values = ["linear_573", "naca0012"] * 2 if path[2] == "outboard_airfoils" else [0.05, 0.04, 0.03]
         data["rotors"][0][path[2]] = {"stations": [0.2, 0.6, 1.0], "values": values[:3]}
@@ -605,6 +610,11 @@ REFUSED = {
         (*R0, "twist_deg"),
         {"stations": [0.0, 0.5, 0.5], "values": [0.0, 1.0, 2.0]},
         "rotors[0].twist_deg.stations = [0.0, 0.5, 0.5]: allowed are increasing numbers",
+    ),
+    "duct without an exit": (
+        (*R0, "duct"),
+        {"turning": 0.5},
+        "rotors[0].duct.exit_area: missing; allowed is 0.25 to 4",
     ),
     "damper without a length": (
         (*R0, "lag_damper"),

@@ -128,6 +128,13 @@ AIRCRAFT = {
     "paper_and_odd_blades": {"name": "sbs_paper", "every_rotor": ODD_BLADE, "rotors": TILTED},
     "odd_blades": {"every_rotor": ODD_BLADE},
     "tilted_shafts": {"rotors": TILTED},
+    "ducts_with_fixed_exits": {
+        "every_rotor": {
+            "duct": {"exit_area": 0.9, "turning": 0.8, "ram_recovery": 0.7, "lip_arm": 0.12, "lip_stall": 0.9}
+        },
+        "rotors": TILTED,
+    },
+    "one_duct": {"rotors": [{"duct": {"exit_area": 1.1}}, {"duct_expansion": 0.7}]},
     "four_and_five_blades": {"rotors": [{"blades": 4}, {"blades": 5}], "every_rotor": ODD_BLADE},
     "seven_and_twelve_blades": {
         "every_rotor": {"blade_mass": 0.05},

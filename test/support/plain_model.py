@@ -548,7 +548,8 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
             moment_s += r * (blade.n @ force) * np.sin(blade.azimuth)
     coefficients = np.array([thrust, moment_c / radius, moment_s / radius]) / force_scale
 
-    mu_x, mu_y = x_hub @ air_velocity_hub / tip_speed, y_hub @ air_velocity_hub / tip_speed
+    met = met_velocity(rotor, air_velocity_hub)
+    mu_x, mu_y = x_hub @ met / tip_speed, y_hub @ met / tip_speed
     mu_z = -u @ air_velocity_hub / tip_speed
     lambda0 = inflow[0]
     lam = lambda0 - mu_z
@@ -561,18 +562,20 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
     k = 15 * np.pi / 64
     gain = np.array(  # order 0, c, s
         [
-            [2 * rotor.duct_expansion**2, -k * x_c, -k * x_s],
+            [2 * (rotor.duct_exit or rotor.duct_expansion) ** 2, -k * x_c, -k * x_s],
             [k * x_c, 2 * (1 + x2) - 4 * x_c**2, -4 * x_c * x_s],
             [k * x_s, -4 * x_c * x_s, 2 * (1 + x2) - 4 * x_s**2],
         ]
     )
     mass = np.array([8 / (3 * np.pi), 16 / (45 * np.pi), 16 / (45 * np.pi)])
-    if not cyclic_inflow:
-        return np.array([omega * (coefficients[0] - v_t * lambda0 / gain[0, 0]) / mass[0], 0.0, 0.0])
     lambdas_0cs = np.array([lambda0, inflow[2], inflow[1]])
     drain = np.array([v_t, v_m, v_m]) * np.linalg.solve(gain, lambdas_0cs)
+    if not cyclic_inflow:
+        drain[0] = v_t * lambda0 / gain[0, 0]
+    if rotor.duct_exit is not None:
+        drain[0] = duct_pressures(ac, rotor, lambda0, air_velocity_hub)[0] / force_scale
     rate_0, rate_c, rate_s = omega * (coefficients - drain) / mass
-    return np.array([rate_0, rate_s, rate_c])
+    return np.array([rate_0, rate_s * cyclic_inflow, rate_c * cyclic_inflow])
 
 
 # ------------------------------------------------------------------------------------------------------------
@@ -594,6 +597,7 @@ class Instant(NamedTuple):
     air_loads: list  # over rotors, over blades, of lists of (s, force)
     pitches: list  # over rotors, over blades, of pairs: pitch at the hinge [rad] and its rate [rad/s]
     state: object  # `split_state`
+    hub_velocities: list  # over rotors, relative to the air, body axes [m/s]
 
 
 def unpack(instant, unknowns):
@@ -662,11 +666,58 @@ def aerodynamic_thrust(instant, j):
     return sum(u @ force for elements in instant.air_loads[j] for _, force in elements)
 
 
-def duct_force(instant, j):
-    """Return the duct's force [N] on the body, at the hub along u: (2 a_w - 1) times the rotor's thrust."""
-    rotor = instant.ac.rotors[j]
+def duct_pressures(ac, rotor, lambda0, air_velocity_hub):
+    """Return thrusts [N] of the rotor and of the duct along u, and the mass flow [kg/s] through both.
+
+    Bernoulli from far upstream to the rotor, and from the rotor to the exit, where the pressure is that of the air: the
+    rotor's pressure rise is the rise of the dynamic pressure and what is lost at the lip. Rotor and duct together have
+    the thrust of the momentum.
+    """
+    density, area = ac.environment.air_density, np.pi * rotor.radius**2
     u = np.asarray(rotor.shaft_direction, dtype=float)
-    return (2 * rotor.duct_expansion - 1) * aerodynamic_thrust(instant, j) * u
+    climb = u @ air_velocity_hub
+    edgewise = np.linalg.norm(air_velocity_hub - climb * u)
+    through = inflow_speed(rotor) * rotor.radius * lambda0 + climb
+    leaving = through / rotor.duct_exit
+    turned = edgewise**2 - ((1 - rotor.duct_turning) * edgewise) ** 2
+    slow = INFLOW_SPEED_FLOOR * inflow_speed(rotor) * rotor.radius
+    steepness = 0.0 if rotor.lip_stall is None else edgewise / (rotor.lip_stall * np.hypot(through, slow))
+    oncoming = climb**2 + rotor.ram_recovery * turned / (1 + steepness**4)
+    share = np.clip(through / (0.25 * np.hypot(np.hypot(climb, edgewise), slow)), -1, 1)
+    rise = density / 2 * (leaving * abs(leaving) - share * (3 - share**2) / 2 * oncoming)
+    mass_flow = density * area * abs(through)
+    return area * rise, mass_flow * (leaving - climb) - area * rise, mass_flow
+
+
+def fixed_exit_load(instant, j):
+    """Return force [N] and moment [N m] about the origin of a duct with a fixed exit: thrust and ram drag."""
+    ac, rotor = instant.ac, instant.ac.rotors[j]
+    u, hub = (np.asarray(values, dtype=float) for values in (rotor.shaft_direction, rotor.hub))
+    _, thrust, mass_flow = duct_pressures(ac, rotor, instant.state.inflow[j][0], instant.hub_velocities[j])
+    along = instant.hub_velocities[j] - u * (u @ instant.hub_velocities[j])
+    drag = -mass_flow * rotor.duct_turning * along
+    return thrust * u + drag, cross(hub, thrust * u) + cross(hub + rotor.lip_arm * u, drag)
+
+
+def met_velocity(rotor, air_velocity_hub):
+    """Return the hub's velocity [m/s] in the air behind the lip of a duct."""
+    if rotor.duct_exit is None:
+        return air_velocity_hub
+    u = np.asarray(rotor.shaft_direction, dtype=float)
+    along = air_velocity_hub - u * (u @ air_velocity_hub)
+    return air_velocity_hub - rotor.duct_turning * along
+
+
+def duct_load(instant, j):
+    """Return the duct's force [N] and moment [N m] about the origin.
+
+    Without a fixed exit it is (2 a_w - 1) times the rotor's thrust at the hub along u.
+    """
+    rotor = instant.ac.rotors[j]
+    if rotor.duct_exit is not None:
+        return fixed_exit_load(instant, j)
+    force = (2 * rotor.duct_expansion - 1) * aerodynamic_thrust(instant, j) * np.asarray(rotor.shaft_direction, float)
+    return force, cross(np.asarray(rotor.hub, dtype=float), force)
 
 
 def hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, lag_dd):
@@ -746,9 +797,9 @@ def residual(instant, unknowns):
     hinges = []
     for j, rotor in enumerate(ac.rotors):
         hub_force, hub_moment = hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd[j], lag_dd[j])
-        hub_force = hub_force + duct_force(instant, j)
-        force = force + hub_force
-        moment = moment + hub_moment + cross(np.asarray(rotor.hub, dtype=float), hub_force)
+        duct_force, duct_moment = duct_load(instant, j)
+        force = force + hub_force + duct_force
+        moment = moment + hub_moment + cross(np.asarray(rotor.hub, dtype=float), hub_force) + duct_moment
         pairs = [
             hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd[j][k], lag_dd[j][k])
             for k in range(rotor.blades)
@@ -799,12 +850,11 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
     air_velocity = state.velocity - attitude.T @ np.asarray(wind, dtype=float)
     blades = make_blades(ac, state, psi)
     part_force, part_moment = part_loads(ac, air_velocity, state.rate, state.inflow)
+    hub_velocities = [air_velocity + cross(state.rate, np.asarray(rotor.hub, dtype=float)) for rotor in ac.rotors]
     air_loads = []
     for j, rotor in enumerate(ac.rotors):
-        air_velocity_hub = air_velocity + cross(state.rate, np.asarray(rotor.hub, dtype=float))
-        air_loads.append(
-            [blade_air_loads(ac, blade, swash[j], state.inflow[j], air_velocity_hub) for blade in blades[j]]
-        )
+        met = met_velocity(rotor, hub_velocities[j])
+        air_loads.append([blade_air_loads(ac, blade, swash[j], state.inflow[j], met) for blade in blades[j]])
     return Instant(
         ac=ac,
         lead_lag=lead_lag,
@@ -817,6 +867,7 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
         air_loads=air_loads,
         pitches=[[hinge_pitch(blade, swash[j]) for blade in own] for j, own in enumerate(blades)],
         state=state,
+        hub_velocities=hub_velocities,
     )
 
 
@@ -859,7 +910,6 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
 
     flap_rates, flap_accelerations, lag_rates, lag_accelerations, inflow_rates = [], [], [], [], []
     loads = {"thrust": [], "torque": [], "force": [], "moment": [], "duct": []}
-    air_velocity = state.velocity - attitude.T @ np.asarray(wind, dtype=float)
     for j, rotor in enumerate(ac.rotors):
         transform = multiblade_matrix(rotor.blades, psi[j])
         transform_d = rotor.speed * multiblade_matrix(rotor.blades, psi[j], 1)
@@ -872,7 +922,6 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
             rest = accelerations - 2 * transform_d @ rates - transform_dd @ coordinates
             rest = rest - speed_rate(rotor) * multiblade_matrix(rotor.blades, psi[j], 1) @ coordinates
             acceleration_list.append(np.linalg.solve(transform, rest))
-        air_velocity_hub = air_velocity + cross(om, np.asarray(rotor.hub, dtype=float))
         inflow_rates.append(
             inflow_rate(
                 ac,
@@ -880,7 +929,7 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
                 instant.blades[j],
                 instant.air_loads[j],
                 state.inflow[j],
-                air_velocity_hub,
+                instant.hub_velocities[j],
                 cyclic_inflow,
             )
         )
@@ -890,7 +939,7 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
         loads["torque"].append(-rotor.rotation * u @ moment)
         loads["force"].append(force)
         loads["moment"].append(moment)
-        loads["duct"].append((2 * rotor.duct_expansion - 1) * aerodynamic_thrust(instant, j))
+        loads["duct"].append(u @ duct_load(instant, j)[0])
     dx = np.concatenate(
         [
             attitude @ state.velocity,
@@ -1042,6 +1091,11 @@ def table6_aircraft(environment=None, body=None, options=None, rotors=None):
         "airfoil": "smooth",
         "duct_expansion": 0.5,
         "induced_power_factor": 1.0,
+        "duct_exit": None,
+        "duct_turning": 1.0,
+        "ram_recovery": 1.0,
+        "lip_arm": 0.0,
+        "lip_stall": None,
     }
     each = [
         {**rotor, "name": "MR1", "hub": np.array([0.0, -0.645, 0.066]), "rotation": -1},

@@ -103,6 +103,14 @@ def test_ground_resonance_is_that_of_the_equations_of_the_plane(report):
     assert case.verdict == MET
 
 
+def test_flap_lag_stability_is_that_of_the_small_angle_theory(report):
+    """With the flow of the source through the disc what is left is of second order in the angles."""
+    case = next(case for case in report.cases if case.name == "ormiston_hodges")
+    judged = [row for row in case.rows if row.aim]
+    assert len(judged) == 3
+    assert max(abs(row.relative_difference) for row in judged) < 0.005
+
+
 def test_the_page_of_the_documentation_is_current_but_for_its_numbers(report):
     from make_validation import NOTE, PAGE, without_numbers
 

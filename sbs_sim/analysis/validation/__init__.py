@@ -25,6 +25,7 @@ CASES = (
     "pitt_peters",
     "castles_gray",
     "hammond",
+    "ormiston_hodges",
     "uh60a",
 )  # modules of this package, in the order in which they are shown
 MODEL = (

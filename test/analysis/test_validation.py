@@ -111,6 +111,20 @@ def test_flap_lag_stability_is_that_of_the_small_angle_theory(report):
     assert max(abs(row.relative_difference) for row in judged) < 0.005
 
 
+def test_autorotation_is_that_of_the_flights_and_of_the_theory_of_the_report(report):
+    """Tilt as flown; coning as the theory of the report has it, whose assumptions are those of the substitutes."""
+    case = next(case for case in report.cases if case.name == "pca2")
+    rms = {row.quantity[:2]: row for row in case.rows if "rms" in row.quantity}
+    assert (rms["a1"].verdict, rms["b1"].verdict) == (MET, MET)
+    assert rms["a0"].ours < 0.7
+    computed = [row for row in case.rows if row.condition.startswith("computed")]
+    coning = [row.difference for row in computed if row.quantity == "a0" and row.published > 5.5]
+    assert max(map(abs, coning)) < 0.15
+    angles = [row.difference for row in case.rows if row.quantity == "shaft angle" and row.aim]
+    assert len(angles) == 12
+    assert math.sqrt(np.mean(np.square(angles))) < 0.5
+
+
 def test_the_page_of_the_documentation_is_current_but_for_its_numbers(report):
     from make_validation import NOTE, PAGE, without_numbers
 
@@ -153,6 +167,34 @@ def test_the_matrix_of_a_rotor_in_vacuum_has_the_frequencies_of_its_blades():
     speed = craft.rotors[0].speed
     assert names == ("a0(1)", "a1(1)", "b1(1)", "da0(1)", "da1(1)", "db1(1)")
     assert [value / speed for value in found] == pytest.approx([0.0, 0.0, 1.0, 1.0, 2.0, 2.0], abs=1e-5)
+
+
+def test_a_rotor_without_engine_finds_the_speed_at_which_it_takes_no_torque():
+    """The same rotor at this constant speed takes none, and a flight that begins elsewhere ends at it."""
+    craft, fidelity, wind = Aircraft.load("pca2"), Fidelity(lead_lag=False), {"airspeed": 20.0, "pitch": 0.15}
+    rotor = IsolatedRotor(craft, fidelity)
+    point = rotor.steady((0.0, 0.0, 0.0), **wind)
+    assert point.torque == pytest.approx(0.0, abs=1e-6 * point.thrust)
+    constant = craft.with_values({"drives": [], "rotors.speed_rpm": point.speed * 30.0 / math.pi})
+    same = IsolatedRotor(constant, fidelity).steady((0.0, 0.0, 0.0), **wind)
+    assert same.torque_coefficient == pytest.approx(0.0, abs=1e-8)
+    assert same.thrust == pytest.approx(point.thrust, rel=1e-4)
+    matrix, names = rotor.matrix(point)
+    assert names[-1] == "Omega(1)"
+    assert np.linalg.eigvals(matrix).real.max() < 0.0
+    state = point.state.copy()
+    state[craft.layout.drive(0)["Omega"]] *= 0.9
+    flight = simulate(craft, state, np.zeros(4), 40.0, method="rk4", lead_lag=False)
+    assert flight["Omega(1)"][-1] == pytest.approx(point.speed, rel=0.01)  # but for waves in the blades' own axes
+
+
+def test_a_rotor_with_an_engine_is_refused_and_a_free_one_has_no_exponents():
+    craft = Aircraft.load("pca2")
+    with pytest.raises(TrimError, match=r"^drives\[0\]\.engine\.kind = 'engine': allowed are none"):
+        IsolatedRotor(craft.with_values({"drives[0].engine.kind": "engine", "drives[0].engine.max_torque": 1.0}))
+    rotor = IsolatedRotor(craft, Fidelity(lead_lag=False))
+    with pytest.raises(TrimError, match="constant speed"):
+        rotor.exponents(rotor.steady((0.0, 0.0, 0.0), airspeed=20.0, pitch=0.15))
 
 
 def test_an_aircraft_with_several_rotors_is_no_isolated_rotor(sbs):

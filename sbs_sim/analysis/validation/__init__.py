@@ -26,6 +26,7 @@ CASES = (
     "castles_gray",
     "hammond",
     "ormiston_hodges",
+    "pca2",
     "uh60a",
 )  # modules of this package, in the order in which they are shown
 MODEL = (

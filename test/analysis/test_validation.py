@@ -13,6 +13,8 @@ from markup import HOSTILE, shown_as_text
 
 from sbs_sim import Aircraft, linearize, simulate, trim
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
+from sbs_sim.analysis.paper_tables import contents
+from sbs_sim.analysis.reproduce import reproduce
 from sbs_sim.analysis.validation import CASES, Aim, Case, Report, compared, data, validate
 from sbs_sim.analysis.validation.comparison import COMPARED, MET, MISSED, spread
 from sbs_sim.analysis.validation.formats import markdown, page_text
@@ -71,12 +73,27 @@ def test_texts_are_never_markup():
 def test_every_case_states_its_source_and_what_an_aim_comes_from(report):
     assert [case.name for case in report.cases] == list(CASES)
     for case in report.cases:
-        assert case.source == data(case.name)["source"]
+        published = contents() if case.name == "paper" else data(case.name)
+        assert case.source == published["source"]
         assert case.statement
         assert case.rows
         assert all(row.aim.why for row in case.rows if row.aim)
         if case.verdict == MISSED:
             assert case.remarks, f"{case.name} misses an aim and says nothing"
+
+
+def test_the_case_of_the_paper_misses_what_reproduce_stars(report):
+    """Every printed number once for each of the two models, judged as the command judges it."""
+    case = next(case for case in report.cases if case.name == "paper")
+    starred = printed = 0
+    for table in reproduce().tables.values():
+        for entry in table.entries():
+            for own in (entry, entry.columns.get("damping")):
+                if own is not None and own.printed.value is not None:
+                    printed += 2
+                    starred += own.is_off(own.complete) + own.is_off(own.paper_reading)
+    assert (len(case.rows), case.count(MISSED)) == (printed, starred)
+    assert 0 < case.count(MISSED) < case.count(MET)
 
 
 def test_the_eigenvalues_of_the_inflow_are_the_closed_form(report):

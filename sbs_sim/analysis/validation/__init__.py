@@ -22,6 +22,7 @@ from sbs_sim.errors import ValidationError
 __all__ = ["CASES", "MODEL", "Aim", "Case", "Report", "Row", "compared", "data", "validate"]
 
 CASES = (
+    "paper",
     "pitt_peters",
     "castles_gray",
     "hammond",

@@ -112,6 +112,28 @@ def test_hover_of_the_model_rotor(report):
     assert median < 0.06
 
 
+def test_thrust_in_hover_hangs_on_the_solidity_and_not_on_the_number_of_blades():
+    """Blades of another chord at the same solidity and Reynolds number: what the four stand for the two with."""
+    craft = Aircraft.load("caradonna_tung")
+    three = {"rotors.blades": 3, "rotors.chord": {"root": 0.127, "tip": 0.127}}
+    three["environment.kinematic_viscosity"] = craft.environment.kinematic_viscosity * 4.0 / 3.0
+    own, other = (
+        IsolatedRotor(aircraft, Fidelity(lead_lag=False)).steady((0.14, 0.0, 0.0))
+        for aircraft in (craft, craft.with_values(three))
+    )
+    assert own.thrust_coefficient == pytest.approx(other.thrust_coefficient, rel=1e-6)
+    assert own.torque_coefficient == pytest.approx(other.torque_coefficient, rel=1e-6)
+
+
+def test_losses_bring_the_thrust_of_two_blades_nearer(report):
+    case = next(case for case in report.cases if case.name == "caradonna_tung")
+    ideal, lossy = case.rows[::2], case.rows[1::2]
+    assert all(
+        abs(with_loss.difference) < 0.5 * abs(row.difference) for row, with_loss in zip(ideal, lossy, strict=True)
+    )
+    assert spread(lossy)[0] < 0.12
+
+
 def test_ground_resonance_is_that_of_the_equations_of_the_plane(report):
     """The same equations by another program: to the digits that are given."""
     case = next(case for case in report.cases if case.name == "hammond")

@@ -25,6 +25,7 @@ CASES = (
     "paper",
     "pitt_peters",
     "castles_gray",
+    "caradonna_tung",
     "hammond",
     "ormiston_hodges",
     "pca2",

@@ -61,7 +61,9 @@ def test_a_case_is_met_when_no_row_is_missed():
 def test_the_spread_is_that_of_the_relative_differences():
     median, worst = spread([ROWS[0], ROWS[1], ROWS[2], ROWS[3]])
     assert (median, worst) == pytest.approx((0.105, 0.25))
-    assert math.isnan(spread(ROWS)[1])  # one has no solution
+    median, worst = spread([ROWS[4], *ROWS[:2]])  # the first has no solution: farther off than all
+    assert median == pytest.approx(0.105)
+    assert math.isnan(worst)
 
 
 def test_texts_are_never_markup():
@@ -219,6 +221,8 @@ def test_a_rotor_without_engine_finds_the_speed_at_which_it_takes_no_torque():
     assert point.torque == pytest.approx(0.0, abs=1e-6 * point.thrust)
     differential = point.state[rotor.layout.flap(0)][3]  # of an even number of blades: it changes sign with every blade
     assert differential == pytest.approx(0.0, abs=1e-9)
+    flying = craft.with_value("body.stand.free", ["x", "y", "z", "roll", "pitch", "yaw"])  # no stand: the hub is held
+    assert IsolatedRotor(flying, fidelity).steady((0.0, 0.0, 0.0), **wind).speed == pytest.approx(point.speed, rel=1e-9)
     constant = craft.with_values({"drives": [], "rotors.speed_rpm": point.speed * 30.0 / math.pi})
     same = IsolatedRotor(constant, fidelity).steady((0.0, 0.0, 0.0), **wind)
     assert same.torque_coefficient == pytest.approx(0.0, abs=1e-8)

@@ -1,4 +1,7 @@
-"""One rotor on a hub that moves steadily, or on a stand that gives way (theory.md section 8.4)."""
+"""One rotor on a hub that moves steadily, or on a stand that gives way (theory.md section 8.4).
+
+Its speed is given, or follows from the torque where it turns freely.
+"""
 
 from __future__ import annotations  # `help` then shows types by their names
 
@@ -45,7 +48,10 @@ class RotorPoint(ByContent):
     state : ndarray, shape (size,)
         Simulation state, with the hub's velocity and attitude in its body part.
     places : ndarray of int64, shape (n,)
-        Indices in it of the unknowns: deflections of a stand, flap, lag where it moves, inflow.
+        Indices in it of the unknowns: deflections of a stand, flap, lag where it moves, inflow, speed where it turns
+        freely.
+    speed : float
+        Of the rotor [rad/s].
     thrust, torque : float
         Mean thrust [N] and shaft torque [N m], which drives where it is positive.
     force, moment : ndarray, shape (3,)
@@ -59,6 +65,7 @@ class RotorPoint(ByContent):
     swashplate: Array
     state: Array
     places: IntArray
+    speed: float
     thrust: float
     torque: float
     force: Array
@@ -74,26 +81,34 @@ class IsolatedRotor:
     Parameters
     ----------
     aircraft : Aircraft
-        With one rotor. Its body has no part in it, unless it is a stand: then its free axes move.
+        With one rotor. Its body has no part in it, unless it is a stand: then its free axes move. With a drive that
+        has no engine the rotor turns freely, and its speed is an unknown.
     fidelity : Fidelity, optional
 
     Raises
     ------
     TrimError
-        The aircraft has several rotors.
+        The aircraft has several rotors, or an engine.
     """
 
     def __init__(self, aircraft: Aircraft, fidelity: Fidelity | None = None) -> None:
         checks.instance("aircraft", aircraft, Aircraft, TrimError)
         if len(aircraft.rotors) != 1:
             raise TrimError(f"rotors: {len(aircraft.rotors)} of them; allowed is one that stands alone")
+        self.is_driven = len(aircraft.drives) > 0
+        if self.is_driven:
+            checks.choice("drives[0].engine.kind", aircraft.drives[0].engine, ("none",), TrimError)
+        if self.is_driven and not aircraft.body.is_stand:
+            aircraft = aircraft.with_value("body.stand.free", [])  # the equations of drives hold the hub on a stand
         self.aircraft, self.fidelity = aircraft, fidelity or Fidelity()
         self.rotor, self.layout = aircraft.rotors[0], aircraft.layout
         self._free = np.flatnonzero(aircraft.body.stand_free) if aircraft.body.is_stand else np.zeros(0, dtype=np.int64)
-        self._azimuths = azimuths(aircraft.passages, self.fidelity.azimuth_count)
+        self._azimuths = azimuths(_repeats(aircraft), self.fidelity.azimuth_count)
         self.places, self.rate_places = self._unknowns()
-        self._scales = np.where(self.rate_places < self.layout.inflow(0).start, self.rotor.speed**2, self.rotor.speed)
+        is_inflow, is_speed = self._is_inflow(self.rate_places), self.rate_places >= self.layout.drives_start
+        self._scales = np.where(is_inflow, self.rotor.speed, self.rotor.speed**2)
         self._scales[self.rate_places < S.BODY_SIZE] = max(aircraft.environment.gravity, 1.0)
+        self._units = np.where(is_speed, self.rotor.speed, 1.0)  # of the unknowns, which are to be of order one
 
     def _unknowns(self) -> tuple[IntArray, IntArray]:
         """Indices of the unknowns, and of their equations in the rate of the state: accelerations, inflow rates."""
@@ -101,8 +116,13 @@ class IsolatedRotor:
         inflow = index[layout.inflow(0)][: 3 if self.fidelity.cyclic_inflow else 1]
         lag = (index[layout.lag(0)], index[layout.lag_rate(0)]) if self.fidelity.lead_lag else (index[:0], index[:0])
         sprung = self._free[self.aircraft.body.stand_spring[self._free] > 0.0]
-        places = np.concatenate([DEFLECTIONS[sprung], index[layout.flap(0)], lag[0], inflow])
-        return places, np.concatenate([S.VELOCITY + sprung, index[layout.flap_rate(0)], lag[1], inflow])
+        speed = [layout.drive(0)[S.SPEED]] if self.is_driven else index[:0]
+        places = np.concatenate([DEFLECTIONS[sprung], index[layout.flap(0)], lag[0], inflow, speed])
+        return places, np.concatenate([S.VELOCITY + sprung, index[layout.flap_rate(0)], lag[1], inflow, speed])
+
+    def _is_inflow(self, places: IntArray) -> NDArray[np.bool_]:
+        """Which indices in the state are those of inflow."""
+        return np.asarray((places >= self.layout.inflow(0).start) & (places < self.layout.drives_start))
 
     def steady(
         self,
@@ -113,7 +133,7 @@ class IsolatedRotor:
         *,
         start: RotorPoint | None = None,
     ) -> RotorPoint:
-        """Flap, lag and inflow whose mean rates vanish.
+        """Flap, lag, inflow and the speed of a free rotor whose mean rates vanish.
 
         Parameters
         ----------
@@ -138,24 +158,26 @@ class IsolatedRotor:
         if len(self._free) and pitch:
             raise TrimError(f"pitch = {pitch:g} rad: allowed is 0 on a stand that gives way, whose rest is level")
         x, swash = self._flight(airspeed, climb_rate, pitch), np.array(swashplate, dtype=float)
-        if start is None:
-            x[self.layout.inflow(0).start] = START_INFLOW
-        else:
-            x = _with(x, self.places, start.state[start.places])
+        x = x if start is None else _with(x, self.places, start.state[start.places])
 
         def residual(values: Array) -> Array:
-            return np.asarray(self._mean(_with(x, self.places, values), swash)[0][self.rate_places] / self._scales)
+            state = _with(x, self.places, values * self._units)
+            return np.asarray(self._mean(state, swash)[0][self.rate_places] / self._scales)
 
-        found = newton(residual, x[self.places])
+        found = newton(residual, x[self.places] / self._units)
         if not found.converged:
             raise TrimError(
                 f"no steady motion of {self.rotor.name}: largest residual {np.abs(found.residual).max():.3g}"
             )
-        return self._point(_with(x, self.places, found.values), swash, float(np.abs(found.residual).max()))
+        state = _with(x, self.places, found.values * self._units)
+        return self._point(state, swash, float(np.abs(found.residual).max()))
 
     def _flight(self, airspeed: float, climb_rate: float, pitch: float) -> Array:
-        """State of the hub with the rotor's states zero."""
+        """State of the hub with the rotor's states where the search begins."""
         x = np.zeros(self.layout.size)
+        x[self.layout.inflow(0).start] = START_INFLOW
+        if self.is_driven:
+            x[self.layout.drive(0)[S.SPEED]] = self.rotor.speed
         x[S.ATTITUDE : S.ATTITUDE + 4] = euler_to_quaternion(0.0, pitch, 0.0)
         x[S.VELOCITY : S.RATES], _ = TrimCondition(airspeed, climb_rate).motion(pitch, 0.0)
         return x
@@ -163,13 +185,15 @@ class IsolatedRotor:
     def _point(self, x: Array, swash: Array, residual: float) -> RotorPoint:
         loads = self._mean(x, swash)[1]
         rotor, density = self.rotor, self.aircraft.environment.air_density
-        tip_speed = rotor.speed * rotor.radius
+        speed = float(self.aircraft.rotor_speeds(x)[0])
+        tip_speed = speed * rotor.radius
         pressure = density * np.pi * rotor.radius**2 * tip_speed**2
         thrust, torque = float(loads[R.THRUST]), float(loads[R.TORQUE])
         return RotorPoint(
             swashplate=swash,
             state=x,
             places=self.places,
+            speed=speed,
             thrust=thrust,
             torque=torque,
             force=loads[R.FORCE : R.FORCE + 3].copy(),
@@ -193,7 +217,7 @@ class IsolatedRotor:
             part = slice(first, min(first + engine.n, len(states)))
             count, slopes = part.stop - part.start, engine.tick.slopes[0]
             given, places = engine.lanes(list(states[part])), engine.lanes(list(psi[part]))
-            if len(self._free):
+            if self.is_driven or len(self._free):
                 engine.derivative(engine.model, given, angles, places, still_air, engine.work, slopes, True)
             else:
                 steady_balance(engine.model, given, angles, places, still_air, engine.work, slopes, left)
@@ -215,7 +239,7 @@ class IsolatedRotor:
         a : ndarray, shape (n, n)
         names : tuple of str
             Of its n states, those of the simulation state: deflections of a stand (in rotation half the angles),
-            angles, velocities of the stand, rates of the angles, inflow.
+            angles, velocities of the stand, rates of the angles, inflow, speed of a rotor that turns freely.
         """
         used = self._used(inflow)
         return self._matrices(point, used, self._azimuths).mean(axis=0), tuple(self.layout.names[i] for i in used)
@@ -244,8 +268,10 @@ class IsolatedRotor:
         Raises
         ------
         TrimError
-            A count that is odd or less than 8.
+            A count that is odd or less than 8, or a rotor whose speed is not constant.
         """
+        if self.is_driven:
+            raise TrimError("drives: allowed is none, Floquet's method needs a constant speed")
         if azimuth_count < MIN_INSTANTS or azimuth_count % 2:
             raise TrimError(f"azimuth_count = {azimuth_count}: allowed are even numbers from {MIN_INSTANTS}")
         period = 2.0 * np.pi / self.rotor.speed
@@ -256,18 +282,19 @@ class IsolatedRotor:
     def _used(self, inflow: bool) -> IntArray:
         """Indices of the states of the system matrix in the simulation state."""
         layout, index = self.layout, np.arange(self.layout.size)
-        is_inflow = self.places >= layout.inflow(0).start
+        is_inflow, is_speed = self._is_inflow(self.places), self.places >= layout.drives_start
         deflections = DEFLECTIONS[self._free]
-        angles = self.places[~is_inflow & (self.places >= S.BODY_SIZE)]
+        angles = self.places[~is_inflow & ~is_speed & (self.places >= S.BODY_SIZE)]
         flap, lag = index[layout.flap_rate(0)], index[layout.lag_rate(0)]
         rates = np.concatenate([flap, lag]) if self.fidelity.lead_lag else flap
         velocities, inflows = S.VELOCITY + self._free, self.places[is_inflow] if inflow else index[:0]
-        return np.concatenate([deflections, angles, velocities, rates, inflows])
+        return np.concatenate([deflections, angles, velocities, rates, inflows, self.places[is_speed]])
 
     def _matrices(self, point: RotorPoint, used: IntArray, psi: Array) -> Array:
         """System matrix at every azimuth, shape (m, n, n)."""
         index, layout, columns = np.arange(self.layout.size), self.layout, []
         rates = {*index[layout.flap_rate(0)].tolist(), *index[layout.lag_rate(0)].tolist()}
+        rates |= set(self.places[self.places >= layout.drives_start].tolist())
         for i in used.tolist():
             step = RATE_STEP * self.rotor.speed if i in rates else ANGLE_STEP
             after, before = (
@@ -276,6 +303,16 @@ class IsolatedRotor:
             )
             columns.append((after - before)[:, used] / (2.0 * step))
         return np.stack(columns, axis=-1)
+
+
+def _repeats(aircraft: Aircraft) -> tuple[int]:
+    """How often the rotor with its multiblade coordinates is the same again in a revolution.
+
+    With every blade; with every other one of an even number, whose differential coordinate changes sign from one to
+    the next.
+    """
+    passages = aircraft.passages[0]
+    return (passages // 2 if passages % 2 == 0 else passages,)
 
 
 def _with(x: Array, places: IntArray, values: Array) -> Array:

@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 from helpers import TEST_STAND, WEIGHTLESS_VACUUM, build
-from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from sbs_sim import linearize, trim
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.floquet import Floquet, _beside, common_period, floquet, transition
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
+from sbs_sim.analysis.validation.hammond import multipliers_of_equations
 from sbs_sim.errors import LinearizationError, TrimError
 from sbs_sim.flight.trim_point import Fidelity
 
@@ -85,28 +85,6 @@ def test_a_rotor_without_one_of_its_lag_dampers(hover):
     assert len(averaged) == 2 * 2 * 3
 
 
-def hammonds_multipliers(speed, factors):
-    """Eigenvalues of the transition over a revolution by Hammond's equations: hub along x, y, four lagging blades."""
-    first, inertia, blade = 289.1, 1084.7, 94.9
-    mass = np.diag([8026.6 + 4 * blade, 3283.6 + 4 * blade, *[inertia] * 4])
-    damping = np.diag([51078.7, 25539.35, *np.multiply(4067.5, factors)])
-    stiffness = np.diag([1240481.8, 1240481.8, *[speed**2 * 0.3048 * first] * 4])
-
-    def rates(t, z):
-        z = z.reshape(12, 12)
-        psi = speed * t + np.arange(4) * math.pi / 2
-        sine, cosine = first * np.sin(psi), first * np.cos(psi)
-        m, c, k = mass.copy(), damping.copy(), stiffness.copy()
-        m[0, 2:] = m[2:, 0] = -sine
-        m[1, 2:] = m[2:, 1] = cosine
-        c[:2, 2:] = -2 * speed * np.array([cosine, sine])
-        k[:2, 2:] = speed**2 * np.array([sine, -cosine])
-        return np.concatenate([z[6:], np.linalg.solve(m, -c @ z[6:] - k @ z[:6])]).ravel()
-
-    end = solve_ivp(rates, (0.0, 2 * math.pi / speed), np.eye(12).ravel(), method="DOP853", rtol=1e-9, atol=1e-9)
-    return np.linalg.eigvals(end.y[:, -1].reshape(12, 12))
-
-
 @pytest.mark.parametrize(("factors", "growth"), [([1.0, 1.0, 1.0, 1.0], -0.3354), ([1.0, 1.0, 1.0, 0.0], 0.3258)])
 def test_ground_resonance_without_one_lag_damper(factors, growth):
     """Hammond's case (J. AHS 19 (4), 1974) at 255 rpm: stable with all dampers, unstable without one of them."""
@@ -114,7 +92,7 @@ def test_ground_resonance_without_one_lag_damper(factors, growth):
     rotor = IsolatedRotor(aircraft, Fidelity(azimuth_count=1))
     exponents = rotor.exponents(rotor.steady((0.0, 0.0, 0.0)), inflow=False)
     period = 2 * math.pi / rotor.rotor.speed
-    theirs, ours = hammonds_multipliers(rotor.rotor.speed, factors), np.exp(exponents * period)
+    theirs, ours = multipliers_of_equations(rotor.rotor.speed, factors), np.exp(exponents * period)
     np.testing.assert_allclose(np.abs(ours[:, None] - theirs).min(axis=0), 0.0, atol=1e-6)
     assert math.log(np.abs(theirs).max()) / period == pytest.approx(growth, abs=1e-4)
     if growth > 0:  # flap, which takes no part, neither grows nor decays

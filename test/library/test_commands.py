@@ -263,7 +263,7 @@ def test_a_bar_is_shown_on_a_terminal_only():
 FAILURES = {
     "unknown aircraft": (
         ("trim", "--aircraft", "sb"),
-        "aircraft = 'sb': allowed are a file's path or one of castles_gray, ",
+        "aircraft = 'sb': allowed are a file's path or one of caradonna_tung, ",
     ),
     "unknown key": (("trim", "--set", "body.mas=1"), "body.mas: unknown key, allowed are mass, inertia, "),
     "bad value": (("linearize", "--set", "body.mass=heavy"), "body.mass = 'heavy': allowed is a number"),

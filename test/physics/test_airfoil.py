@@ -340,6 +340,17 @@ def test_naca0015_lifts_as_castles_and_gray_measured():
     np.testing.assert_array_equal(table.cl, -table.cl[:, ::-1])
 
 
+def test_thin_2pi_is_what_its_tool_writes_and_its_formula(tmp_path):
+    spec = importlib.util.spec_from_file_location("make_thin_airfoil", ROOT / "tools" / "make_thin_airfoil.py")
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    write_table(tmp_path / "thin_2pi.csv", tool.make_table(), tool.COMMENTS)
+    kept, written = (read_table(folder / "thin_2pi.csv", 10.0) for folder in (AIRFOILS, tmp_path))
+    for table in (kept, written):
+        np.testing.assert_allclose(table.cl, np.tile(2 * math.pi * np.sin(table.alpha), (2, 1)), atol=1.1e-6)
+        np.testing.assert_array_equal(table.cd, 0.01)
+
+
 # --- Look-up --------------------------------------------------------------------------------------
 
 

@@ -22,9 +22,13 @@ from sbs_sim.errors import ValidationError
 __all__ = ["CASES", "MODEL", "Aim", "Case", "Report", "Row", "compared", "data", "validate"]
 
 CASES = (
+    "paper",
     "pitt_peters",
     "castles_gray",
+    "caradonna_tung",
     "hammond",
+    "ormiston_hodges",
+    "pca2",
     "uh60a",
 )  # modules of this package, in the order in which they are shown
 MODEL = (

@@ -37,7 +37,6 @@ def case() -> Case:
         " freely. The torque is that less the one at zero collective, as the report has it.",
         substitutes=(
             "Blade mass and hinge offset, on which the mean loads in hover hardly depend: 0.5 kg, uniform, 0 m.",
-            "Section: the table of NACA 0012 for NACA 0015, which is not among the airfoils.",
         ),
         rows=tuple(rows),
         remarks=REMARKS,

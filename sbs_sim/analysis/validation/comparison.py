@@ -2,7 +2,7 @@
 
 import math
 import statistics
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -149,13 +149,17 @@ def compared(
 
 
 def spread(rows: Iterable[Row]) -> tuple[float, float]:
-    """Median and worst of the relative differences, without sign; NaN where there are none."""
+    """Median and worst of the relative differences, without sign; NaN where there are none.
+
+    A row without a solution is farther off than any other: the worst is NaN then.
+    """
     found = [abs(row.relative_difference) for row in rows if row.published]
-    return (statistics.median(found), _worst(found)) if found else (math.nan, math.nan)
+    far = [math.inf if math.isnan(value) else value for value in found]
+    return (_finite(statistics.median(far)), _finite(max(far))) if far else (math.nan, math.nan)
 
 
-def _worst(values: Sequence[float]) -> float:
-    return math.nan if any(map(math.isnan, values)) else max(values)
+def _finite(value: float) -> float:
+    return value if math.isfinite(value) else math.nan
 
 
 def _spread_entry(rows: Iterable[Row]) -> dict[str, float]:

@@ -349,6 +349,7 @@ BAD = {
         AERODYN.replace("          2   NumTabs", "          3   NumTabs"),
         ":20: the file has 2 tables, must have 3, its NumTabs",
     ),
+    "a file of AeroDyn without a table": ("! NumAlf\n 1 Re\n", ":2: the file has no table, must have one"),
     "a flap": (
         AERODYN.replace("Re\n          0   UserProp", "Re\n          5   UserProp"),
         ":14: control setting 5 must be that of the first table",

@@ -163,7 +163,7 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
 def _known_numbers(aircraft: Aircraft, rotor: int) -> str:
     """Reynolds or Mach numbers of the airfoil tables of a rotor in words."""
     ranges = dict.fromkeys(table.range for table in aircraft.sections[rotor] if len(table.numbers) > 1)
-    if len(ranges) > 1:
+    if len(ranges) != 1:
         return "those of the airfoil tables"
     ((low, high),) = ranges
     return f"{low:g} to {high:g}, those of the airfoil table"

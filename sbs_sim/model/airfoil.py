@@ -277,7 +277,7 @@ def read_table(path: str | Path, aspect_ratio: float) -> AirfoilTable:
 
 def parse_table(path: Path, text: str, aspect_ratio: float) -> AirfoilTable:
     """Airfoil table of the text of a file, see `read_table`; the path is for its name and for messages."""
-    columns, values, lines = parse_rows(path, text)
+    columns, values, lines = _parse_rows(path, text)
     axis = columns[0] if columns[0] in AXES else AXES[0]
     blocks = _split_blocks(path, axis, values, lines)
     half = _check_angles(path, axis, values, lines, blocks)
@@ -314,7 +314,7 @@ def read_text(path: Path, errors: str = "strict") -> str:
         raise AirfoilError(f"{path}: byte {error.start} is not UTF-8 text") from error
 
 
-def parse_rows(path: Path, text: str) -> tuple[tuple[str, ...], Array, list[int]]:
+def _parse_rows(path: Path, text: str) -> tuple[tuple[str, ...], Array, list[int]]:
     """Columns of a CSV file, all rows as numbers, shape (n, 4), and the line number of each."""
     content = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1)]
     content = [(i, line) for i, line in content if line and not line.startswith("#")]

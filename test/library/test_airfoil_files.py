@@ -184,12 +184,21 @@ def test_c81_numbers_between_blanks_and_card_numbers_behind_the_columns(tmp_path
     drag += [f"{angle:7.1f}  2.D-2 30.D-3".ljust(72) + "C8100002" for angle in (-10, 0, 10)]
     text = "\n".join(["SHORT 12 3 2 3 0 0", mach, *rows, *drag])
     data = read_airfoil(write(tmp_path, "a.c81", text))
-    assert len(data.polars) == 12
+    assert (data.name, len(data.polars)) == ("SHORT", 12)
     np.testing.assert_allclose([polar.cl[2] for polar in data.polars], 1.0 + np.arange(12))
     np.testing.assert_allclose([polar.cd[0] for polar in data.polars[::11]], [0.02, 0.03])
     assert "drag held beyond its Mach numbers 0 to 0.5" in data.remarks
     other = text.replace(f"{10:7.1f}  2.D-2", f"{9:7.1f}  2.D-2")
     assert "cut to -10 to 9 deg, which both lift and drag have" in read_airfoil(write(tmp_path, "b.c81", other)).remarks
+
+
+def test_csv_columns_may_have_other_names_and_any_order(tmp_path):
+    head = "! of a test\nCd, Mach ,alpha [deg],Cl,f_st\n"
+    rows = "".join(f"0.02,{mach},{angle},{mach * angle},1\n" for mach in (0.3, 0.6) for angle in (-10, 0, 10 * mach))
+    data = read_airfoil(write(tmp_path, "a.csv", head + rows))
+    assert [polar.numbers for polar in data.polars] == [{"mach": 0.3}, {"mach": 0.6}]
+    np.testing.assert_allclose(data.polars[1].alpha, [-10, 0, 6])
+    np.testing.assert_allclose(data.polars[1].cl, [-6, 0, 3.6])
 
 
 def test_an_old_aerodyn_file_and_a_cylinder_at_three_angles(tmp_path):
@@ -211,6 +220,18 @@ def test_comments_may_have_any_bytes_and_files_are_limited(tmp_path):
         file.truncate(20_000_001)
     with pytest.raises(AirfoilError, match="more than 20000000 bytes, allowed for airfoil tables"):
         read_airfoil(path)
+
+
+def test_a_polar_that_ends_at_90_deg_is_extended_from_below(tmp_path):
+    rows = [
+        f"{a},{math.sin(a * DEG) * math.cos(a * DEG)},{1.29 * math.sin(a * DEG) ** 2 + 0.01}" for a in range(-90, 91, 5)
+    ]
+    table, _, remarks = import_airfoil([write(tmp_path, "a.csv", "\n".join(["alpha,cl,cd", *rows]))])
+    assert remarks[1:3] == [
+        "polar: cut to -85 to 85 deg, below 90 deg, where extensions begin",
+        "polar: extended below -85 and above 85 deg by viterna",
+    ]
+    assert interpolate(table, 0, 90 * DEG)[1] == pytest.approx(1.29, abs=1e-6)  # of an aspect ratio of 10
 
 
 def test_a_symmetric_polar_is_mirrored(tmp_path):
@@ -328,6 +349,7 @@ BAD = {
         AERODYN.replace("          2   NumTabs", "          3   NumTabs"),
         ":20: the file has 2 tables, must have 3, its NumTabs",
     ),
+    "a file of AeroDyn without a table": ("! NumAlf\n 1 Re\n", ":2: the file has no table, must have one"),
     "a flap": (
         AERODYN.replace("Re\n          0   UserProp", "Re\n          5   UserProp"),
         ":14: control setting 5 must be that of the first table",
@@ -342,6 +364,14 @@ BAD = {
     ),
     "lift beyond all": (AERODYN.replace("1.358", "1358."), ":11: cl 1358 at 10 deg must be between -100 and 100"),
     "an angle beyond": (AERODYN.replace("   -12.01", "  -192.01"), ":9: angle -192.01 must be between -180 and 180"),
+    "angles in radians": ("alpha (rad),cl,cd\n0,0,1\n", ":1: 'alpha (rad),cl,cd' must have angles in degrees"),
+    "a CSV row that is short": ("alpha,cl,cd\n0,0,1\n1,1\n", ":3: 2 values, must be 3, as in the header"),
+    "a CSV field": ("alpha,cl,cd\n0,<i>,1\n", ":2: cl '<i>' must be a finite number"),
+    "a CSV file without rows": ("# x\nalpha,cl,cd\n", ":2: no rows follow the header"),
+    "numbers like the counts of a C81 file": (
+        " -110.0 0.45 1.3 0.0E+0 -11.689840683245166 0.45\n -80 0 1 0 0 0\n",
+        "begins no airfoil file",
+    ),
     "a drag of zero": (AERODYN.replace("0.0205", "0.0"), ":20: cd 0 at 180 deg must be greater than 0 and at most 100"),
 }
 
@@ -391,5 +421,5 @@ def test_the_command_tells_what_it_does_and_writes_what_aircraft_take(tmp_path):
     command = [sys.executable, str(EXECUTABLE), "wing.csv", "--out", "wing.c81"]
     refused = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
     assert (refused.returncode, refused.stdout) == (1, "")
-    assert refused.stderr == "wing: a C81 table is over the Mach number, must have one Reynolds number\n"
+    assert refused.stderr == "wing: a C81 table is over the Mach number, must have one Reynolds number (--reynolds)\n"
     assert not (tmp_path / "wing.c81").exists()

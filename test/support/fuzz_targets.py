@@ -27,6 +27,8 @@ from ruamel.yaml import YAML
 
 from sbs_sim import Aircraft, LinearModel, Simulation, linearize, simulate, sweep, trim
 from sbs_sim.aircraft.airfoil_files import read_airfoil
+from sbs_sim.aircraft.airfoil_files.c81 import c81_text
+from sbs_sim.aircraft.airfoil_files.extension import METHODS
 from sbs_sim.aircraft.airfoil_files.table import table_of
 from sbs_sim.analysis.batch import Case, simulate_batch
 from sbs_sim.analysis.monte_carlo import gust_cases
@@ -625,8 +627,11 @@ def check_airfoil(data: bytes) -> None:
             assert all(np.isfinite(values).all() for values in (table.numbers, table.alpha, table.cl, table.cd))
             assert (table.cd > 0).all()
         with refusing():
-            table, _ = table_of("a", read_airfoil(folder / "a.csv").polars, "viterna", 8.0)
+            extension = (*METHODS, None)[len(data) % (len(METHODS) + 1)]
+            table, _ = table_of("a", read_airfoil(folder / "a.csv").polars, extension, 8.0)
             assert all(np.isfinite(values).all() for values in (table.numbers, table.alpha, table.cl, table.cd))
+            assert (table.cd > 0).all()
+            c81_text(table, "a")
 
 
 CSV_PIECES = (
@@ -684,6 +689,25 @@ AIRFOILS = (
 0 0.1 0.01
 7.11 0.6 0.01
 180 0 0.02
+""",
+    b"""of a test
+1 Number of airfoil tables in this file
+0 Table ID parameter
+-180 0 0.02
+-7.6 -0.5 0.01
+0 0.1 0.01
+7.1 0.6 0.01
+180 0 0.02
+EOT
+""",
+    b"""Xfoil polar. Reynolds number fixed. Mach  number fixed
+Airfoil,n12
+Reynolds number,50000
+Mach,0
+Alpha,Cl,Cd,Cdp
+-9.25,-0.9,0.02,0.01
+0,0.1,0.01,0.01
+9.25,1.0,0.02,0.01
 """,
 )
 

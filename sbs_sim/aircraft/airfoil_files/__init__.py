@@ -5,21 +5,20 @@
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from sbs_sim.aircraft.airfoil_files.aerodyn import is_aerodyn, is_old_aerodyn, read_aerodyn, read_old_aerodyn
 from sbs_sim.aircraft.airfoil_files.c81 import is_c81, read_c81
-from sbs_sim.aircraft.airfoil_files.polar import AirfoilData, Row, make_polar, plain
+from sbs_sim.aircraft.airfoil_files.csv_table import is_csv, read_csv
+from sbs_sim.aircraft.airfoil_files.polar import AirfoilData, plain
 from sbs_sim.aircraft.airfoil_files.table import table_of
 from sbs_sim.aircraft.airfoil_files.xfoil import is_xfoil, read_xfoil
 from sbs_sim.errors import AirfoilError
-from sbs_sim.model.airfoil import AXES, AirfoilTable, parse_rows, read_text
+from sbs_sim.model.airfoil import AirfoilTable, read_text
 
 READERS = (
+    (is_csv, read_csv),
     (is_aerodyn, read_aerodyn),
     (is_old_aerodyn, read_old_aerodyn),
     (is_xfoil, read_xfoil),
@@ -75,8 +74,8 @@ def read_airfoil(path: str | Path) -> AirfoilData:
     """Read a file of a kind that its content tells.
 
     C81: lift and drag over Mach numbers, which need not be the same for both; moments are left out. XFOIL, XFLR5,
-    QBlade, airfoiltools.com: polars at fixed Reynolds and Mach numbers. AeroDyn: the tables of an airfoil file. CSV: as
-    `sbs_sim.model.airfoil.read_table`, except that each block may have its own angles.
+    QBlade, airfoiltools.com: polars at fixed Reynolds and Mach numbers. AeroDyn: the tables of an airfoil file. CSV:
+    columns for angle, lift and drag, see `sbs_sim.aircraft.airfoil_files.csv_table`.
 
     Parameters
     ----------
@@ -88,26 +87,12 @@ def read_airfoil(path: str | Path) -> AirfoilData:
         One line: file, line, the value and what is allowed.
     """
     path = Path(path)
-    text = read_text(path, errors="replace")  # comments may have any characters
-    lines = text.splitlines()
-    first = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
-    if "alpha_deg" in first:
-        return _read_csv(path, text)
+    lines = read_text(path, errors="replace").splitlines()  # comments may have any characters
     for is_of_kind, read in READERS:
         if is_of_kind(lines):
             return read(path, lines)
+    first = next((line for line in lines if line.strip()), "")
     raise AirfoilError(
         f"{path}:1: {plain(first)!r} begins no airfoil file, allowed are C81 tables, polars of XFOIL or XFLR5,"
-        " AeroDyn airfoil files, and CSV with alpha_deg, cl and cd"
+        " AeroDyn airfoil files, and CSV with the columns alpha_deg, cl and cd"
     )
-
-
-def _read_csv(path: Path, text: str) -> AirfoilData:
-    columns, values, lines = parse_rows(path, text)
-    starts = [0, *(np.flatnonzero(np.diff(values[:, 0])) + 1), len(values)]
-    polars = []
-    for first, end in pairwise(starts):
-        numbers = {columns[0]: float(values[first, 0])} if columns[0] in AXES else {}
-        rows = [Row(lines[i], *map(float, values[i, 1:])) for i in range(first, end)]
-        polars.append(make_polar(path, lines[first], rows, numbers)[0])
-    return AirfoilData("CSV", path.stem, tuple(polars))

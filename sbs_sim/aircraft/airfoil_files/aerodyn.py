@@ -63,6 +63,8 @@ def read_aerodyn(path: Path, lines: Sequence[str]) -> AirfoilData:
         raise AirfoilError(f"{path}:{line}: control setting {plain(list(settings)[1])} must be that of the first table")
     if count is not None and count != len(polars):
         raise AirfoilError(f"{path}:{len(lines)}: the file has {len(polars)} tables, must have {count}, its NumTabs")
+    if not polars:
+        raise AirfoilError(f"{path}:{len(lines)}: the file has no table, must have one behind a line with NumAlf")
     remarks = (f"{repeated} repeated angles left out",) if repeated else ()
     return AirfoilData("AeroDyn airfoil file", path.stem, tuple(polars), remarks)
 

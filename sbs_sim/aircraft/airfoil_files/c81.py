@@ -31,13 +31,16 @@ DATA_END, CARD_END = 70, 80  # behind the fields a punched card has room for its
 MAX_COUNT = 99  # in two digits
 
 
-def counts_of(line: str) -> list[int] | None:
-    """The six counts of a first line; none if it has none. They may be apart or touch, the name may be shorter."""
-    fixed = [line[NAME_LENGTH + COUNT_WIDTH * k : NAME_LENGTH + COUNT_WIDTH * (k + 1)].strip() for k in range(COUNTS)]
-    for fields in (line[NAME_LENGTH:].split(), fixed, line.split()[-COUNTS:]):
+def head_of(line: str) -> tuple[str, list[int]] | None:
+    """Name and the six counts of a first line; none if it has none. Counts may touch, and the name may be shorter."""
+    name, rest = line[:NAME_LENGTH], line[NAME_LENGTH:]
+    ends = [COUNT_WIDTH * k for k in range(COUNTS + 1)]
+    touching = [] if rest[ends[-1] :][:1].isdigit() else [rest[first:end].strip() for first, end in pairwise(ends)]
+    short = line.rsplit(maxsplit=COUNTS)
+    for head, fields in ((name, rest.split()), (name, touching), (short[0] if short else "", short[1:])):
         is_counts = len(fields) == COUNTS and all(field.isascii() and field.isdecimal() for field in fields)
         if is_counts and all(int(field[:9]) > 0 for field in fields[:4]):
-            return [int(field[:9]) for field in fields]
+            return plain(head).rstrip(" ;"), [int(field[:9]) for field in fields]
     return None
 
 
@@ -118,7 +121,7 @@ class _Block(NamedTuple):
 
 def is_c81(lines: Sequence[str]) -> bool:
     """True if the first line of a file has the counts of a C81 table."""
-    return bool(lines) and counts_of(lines[0]) is not None
+    return bool(lines) and head_of(lines[0]) is not None
 
 
 def read_c81(path: Path, lines: Sequence[str]) -> AirfoilData:
@@ -129,7 +132,7 @@ def read_c81(path: Path, lines: Sequence[str]) -> AirfoilData:
     AirfoilError
         One line: file, line, the value and what is allowed.
     """
-    counts = counts_of(lines[0]) or []
+    name, counts = head_of(lines[0]) or ("", [])
     reader = _Lines(path, lines)
     lift, drag = reader.block("cl", counts[:2]), reader.block("cd", counts[2:4])
     low, high = max(lift.angles[0], drag.angles[0]), min(lift.angles[-1], drag.angles[-1])
@@ -141,8 +144,7 @@ def read_c81(path: Path, lines: Sequence[str]) -> AirfoilData:
         rows = [Row(2, *map(float, values)) for values in zip(angles, cl_row, cd_row, strict=True)]
         polars.append(make_polar(path, 2, rows, {"mach": float(number)})[0])
     remarks = [*(["moments left out"] if any(counts[4:]) else []), *_joined(lift, drag)]
-    name = plain(lines[0][:NAME_LENGTH]) or path.stem
-    return AirfoilData("C81 table", name, tuple(polars), tuple(remarks))
+    return AirfoilData("C81 table", name or path.stem, tuple(polars), tuple(remarks))
 
 
 def _joined(lift: _Block, drag: _Block) -> list[str]:
@@ -179,7 +181,9 @@ def c81_text(table: AirfoilTable, name: str) -> tuple[str, tuple[float, float]]:
         A table over several Reynolds numbers, or over more than 99 Mach numbers.
     """
     if table.axis != "mach" and len(table.numbers) > 1:
-        raise AirfoilError(f"{table.name}: a C81 table is over the Mach number, must have one Reynolds number")
+        raise AirfoilError(
+            f"{table.name}: a C81 table is over the Mach number, must have one Reynolds number (--reynolds)"
+        )
     single = len(table.numbers) == 1
     mach = np.array([0.0, 1.0]) if single else table.numbers
     cl, cd = (np.repeat(values, 2, axis=0) if single else values for values in (table.cl, table.cd))

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from sbs_sim.aircraft.airfoil_files.extension import METHODS
-from sbs_sim.aircraft.airfoil_files.polar import Polar
+from sbs_sim.aircraft.airfoil_files.polar import SAME_DEG, Polar
 from sbs_sim.errors import AirfoilError
 from sbs_sim.model.airfoil import (
     AXES,
@@ -23,6 +23,7 @@ from sbs_sim.model.airfoil import (
 )
 
 GRID_DEG = 0.1  # to which angles without a common step are moved
+BROADSIDE_DEG = 90.0
 CLOSED = 1e-3  # of lift and drag at -180 and 180 deg: larger differences are told
 NO_LIFT = 1e-3  # so much lift at 0 deg a symmetric section may have, for programs do not iterate to zero
 MAX_POLARS = 200
@@ -163,11 +164,10 @@ def _cut(polars: list[Polar], remarks: list[str]) -> list[Polar]:
 def _extended(polar: Polar, extension: str, aspect_ratio: float, remarks: list[str]) -> Polar:
     if polar.is_full:
         return polar
+    polar = _cut_below_broadside(polar, remarks)
     low, high = float(polar.alpha[0]), float(polar.alpha[-1])
-    if not -90 < low < 0 < high < 90:
-        raise AirfoilError(
-            f"{polar.where}: angles {low:g} to {high:g} deg must begin between -90 and 0 and end between 0 and 90"
-        )
+    if not low < 0 < high:
+        raise AirfoilError(f"{polar.where}: angles {low:g} to {high:g} deg must begin below 0 and end above 0")
     try:
         alpha, cl, cd = METHODS[extension](np.radians(polar.alpha), polar.cl, polar.cd, aspect_ratio)
     except AirfoilError as error:
@@ -176,6 +176,18 @@ def _extended(polar: Polar, extension: str, aspect_ratio: float, remarks: list[s
         raise AirfoilError(f"{polar.where}: {extension} gives a drag of {cd.min():.4g}, must be greater than 0")
     remarks.append(f"{polar.number}: extended below {low:g} and above {high:g} deg by {extension}")
     return replace(polar, alpha=np.asarray(np.round(np.degrees(alpha), 6), np.float64), cl=cl, cd=cd)
+
+
+def _cut_below_broadside(polar: Polar, remarks: list[str]) -> Polar:
+    """Polar without angles of 90 deg and more, at which no extension can begin."""
+    kept = np.abs(polar.alpha) < BROADSIDE_DEG - SAME_DEG
+    if kept.all():
+        return polar
+    if kept.sum() < 3:
+        raise AirfoilError(f"{polar.where}: the polar has {kept.sum()} angles between -90 and 90 deg, must have 3")
+    alpha = polar.alpha[kept]
+    remarks.append(f"{polar.number}: cut to {alpha[0]:g} to {alpha[-1]:g} deg, below 90 deg, where extensions begin")
+    return polar.at(alpha)
 
 
 def _closed(polar: Polar, remarks: list[str]) -> Polar:

@@ -395,7 +395,7 @@ def _choices(found: _Found, groups: Sequence[_Group], states: _States) -> list[l
     """
     leads = found.participation.argmax(axis=1).tolist()
     families = {family: found.sums(places) for family, places in states.families.items()}
-    measures = [(found.largest if group.family == "body" else found.sums)(group.states) for group in groups]
+    measures = [_measures(found, group) for group in groups]
     return [
         _own_choices(
             {family: shares[i] for family, shares in families.items()},
@@ -404,6 +404,22 @@ def _choices(found: _Found, groups: Sequence[_Group], states: _States) -> list[l
         )
         for i, lead in enumerate(leads)
     ]
+
+
+def _measures(found: _Found, group: _Group) -> list[float]:
+    """What every mode has of a group: the largest share of the body's states; the share of the rotors it would name."""
+    if group.family == "body":
+        return found.largest(group.states)
+    total = found.sums(group.states)
+    if len(group.rotors) < 2:
+        return total
+    largest = map(max, zip(*(found.sums(places) for places in group.by_rotor.values()), strict=True))
+    return [_named_share(one, both) for one, both in zip(largest, total, strict=True)]
+
+
+def _named_share(largest: float, total: float) -> float:
+    """Share of the rotor that alone is named, or of all."""
+    return largest if largest > OWNED * total else total
 
 
 def _own_choices(

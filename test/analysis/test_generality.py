@@ -18,7 +18,6 @@ WITHOUT_TRIM = {
     1: "^no trim: the rotors cannot carry more than .* of the weight",
     5: "^no trim: no control sets the yawing moment",
     6: "^no trim: the rotors cannot carry more than .* of the weight, where main stalls",
-    8: "^body.stand: ",
 }
 
 

@@ -11,14 +11,13 @@ import pytest
 from helpers import build
 from markup import HOSTILE, shown_as_text
 
-from sbs_sim import Aircraft, linearize, simulate, trim
+from sbs_sim import Aircraft
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
 from sbs_sim.analysis.validation import CASES, Aim, Case, Report, compared, data, validate
 from sbs_sim.analysis.validation.comparison import COMPARED, MET, MISSED, spread
 from sbs_sim.analysis.validation.formats import markdown, page_text
-from sbs_sim.errors import SimulationError, TrimError, ValidationError
+from sbs_sim.errors import TrimError, ValidationError
 from sbs_sim.flight.trim_point import Fidelity
-from sbs_sim.model import state as S
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
@@ -150,19 +149,6 @@ def test_the_matrix_of_a_rotor_in_vacuum_has_the_frequencies_of_its_blades():
 def test_an_aircraft_with_several_rotors_is_no_isolated_rotor(sbs):
     with pytest.raises(TrimError, match="rotors: 2 of them"):
         IsolatedRotor(sbs)
-
-
-def test_an_aircraft_on_a_stand_is_trimmed_by_no_one():
-    """A body that does not fly has no trim, no linear model of one and no flight that begins with it."""
-    craft, flown = Aircraft.load("hammond"), Aircraft.load("sbs")
-    point = trim(flown)
-    for call in (trim, linearize):
-        with pytest.raises(TrimError, match=r"^body\.stand: .*IsolatedRotor"):
-            call(craft)
-    with pytest.raises(SimulationError, match=r"^body\.stand: .*give a state"):
-        simulate(craft, point, point.controls, 0.1)
-    flight = simulate(craft, np.eye(1, craft.layout.size, S.ATTITUDE)[0], np.zeros(4), 0.01)
-    assert np.isfinite(flight["state"]).all()
 
 
 def test_a_rotor_far_beyond_its_stall_or_speed_is_refused_in_a_line():

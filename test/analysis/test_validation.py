@@ -11,7 +11,7 @@ import pytest
 from helpers import build
 from markup import HOSTILE, shown_as_text
 
-from sbs_sim import Aircraft
+from sbs_sim import Aircraft, trim
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
 from sbs_sim.analysis.validation import CASES, Aim, Case, Report, compared, data, validate
 from sbs_sim.analysis.validation.comparison import COMPARED, MET, MISSED, spread
@@ -72,7 +72,7 @@ def test_every_case_states_its_source_and_what_an_aim_comes_from(report):
     for case in report.cases:
         assert case.source == data(case.name)["source"]
         assert case.statement
-        assert case.rows
+        assert case.rows or case.tables
         assert all(row.aim.why for row in case.rows if row.aim)
         if case.verdict == MISSED:
             assert case.remarks, f"{case.name} misses an aim and says nothing"
@@ -100,6 +100,25 @@ def test_ground_resonance_is_that_of_the_equations_of_the_plane(report):
     eigenvalues = [row for row in case.rows if not row.quantity.startswith("undamped")]
     assert max(abs(row.difference) for row in eigenvalues) < 1e-6
     assert case.verdict == MET
+
+
+def test_trims_and_rate_matrices_of_the_genhel_class_are_those_of_a_helicopter(report):
+    """Without published values: least power in between, damped rates, nose down and more collective in fast flight."""
+    case = next(case for case in report.cases if case.name == "uh60a_genhel")
+    trims, rates = ({name: values for name, _, values in table.rows} for table in case.tables)
+    assert case.tables[0].conditions == tuple(f"{speed} kt" for speed in range(0, 161, 20))
+    assert len(rates) == 36
+    assert all(math.isfinite(value) for values in (*trims.values(), *rates.values()) for value in values)
+    point = trim(Aircraft.load("uh60a_genhel"), 80 * 0.514444)
+    assert trims["pitch attitude"][4] == pytest.approx(math.degrees(point.pitch))
+    assert trims["power"][4] == pytest.approx(point.power.sum() / 1000.0)
+    assert min(trims["power"]) == min(trims["power"][3:5])
+    assert trims["power"][3] < 0.6 * trims["power"][0] < trims["power"][8]
+    assert trims["pitch attitude"][8] < 0.0 < trims["pitch attitude"][0]
+    for damping in ("X_u", "Z_w", "M_q", "L'_p", "N'_r", "Y_v"):
+        assert max(rates[damping]) < 0.0, damping
+    entry = report.to_dict()["cases"][-1]
+    assert entry["tables"][1]["rows"][0] == {"quantity": "X_u", "unit": "1/s", "values": list(rates["X_u"])}
 
 
 def test_the_page_of_the_documentation_is_current_but_for_its_numbers(report):

@@ -26,6 +26,7 @@ CASES = (
     "castles_gray",
     "hammond",
     "uh60a",
+    "uh60a_genhel",
 )  # modules of this package, in the order in which they are shown
 MODEL = (
     "One model and one set of options for all cases: rigid blades on hinges, 20 elements of a blade, airfoil tables"

@@ -1,6 +1,7 @@
 """Times of the derivative with what aircraft files may add, each beside that of `sbs`.
 
-`./run python benchmarks/option_rows.py` prints them. Both are called in turn in one run, as in plain_ratio.py: the figure is the median of the ratios of neighbours.
+`./run python benchmarks/option_rows.py` prints them. Both are called in turn in one run, as in plain_ratio.py: the
+figure is the median of the ratios of neighbours.
 """
 
 import statistics

@@ -34,7 +34,15 @@ from sbs_sim.aircraft.declaration import (
     string,
 )
 from sbs_sim.content import ByContent
-from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, ENGINE_TORQUE, GOVERNOR, SPEED, SWASHPLATE_NAMES
+from sbs_sim.model.state import (
+    CONTROL_AXES,
+    CONTROL_NAMES,
+    DEFLECTIONS,
+    ENGINE_TORQUE,
+    GOVERNOR,
+    SPEED,
+    SWASHPLATE_NAMES,
+)
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
@@ -43,7 +51,7 @@ MAX_ROTORS, MAX_CONTROLS, MAX_SURFACES = 16, 16, 32
 MAX_CONTROL = 1e6  # of a control that is no angle, in its unit
 TRIMMED_CONTROLS = 4  # that a trim finds
 MAX_BLADES = 20
-STAND_AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+STAND_AXES = tuple(DEFLECTIONS)
 
 
 @dataclass(frozen=True)

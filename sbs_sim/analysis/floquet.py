@@ -76,8 +76,10 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
     Raises
     ------
     LinearizationError
-        A count out of range, or rotors whose blade passages have no common period.
+        A count out of range, rotors whose blade passages have no common period, or a stand.
     """
+    if aircraft.body.is_stand:
+        raise LinearizationError("body.stand: allowed is none; IsolatedRotor.exponents has those of a rotor on a stand")
     least, most = AZIMUTH_COUNTS
     if not least <= azimuth_count <= most or azimuth_count % 2:
         raise LinearizationError(f"azimuth_count = {azimuth_count}: allowed are even numbers from {least} to {most}")

@@ -18,7 +18,7 @@ from sbs_sim.analysis.control_effects import ControlEffect, control_effects
 from sbs_sim.analysis.modes import Mode, modes
 from sbs_sim.content import ByContent
 from sbs_sim.errors import ExportError, LinearizationError
-from sbs_sim.flight.trim_point import TrimPoint
+from sbs_sim.flight.trim_point import StandPoint, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.solve import product, solve
 from sbs_sim.output.files import check_target, write
@@ -133,6 +133,10 @@ class LinearModel(ByContent):
         LinearizationError
             A name that the model does not have, or states that do not settle (A_ff is singular).
         """
+        if isinstance(self.trim, StandPoint) and kept is S.LINEAR_BODY_NAMES:
+            raise LinearizationError(
+                "body.stand: the states of a body in flight, to which models are reduced, are locked"
+            )
         missing = [name for name in kept if name not in self.state_names]
         if missing:
             raise LinearizationError(f"kept = {missing[0]}: allowed are {', '.join(self.state_names)}")
@@ -154,13 +158,15 @@ class LinearModel(ByContent):
 
     @cached_property
     def control_effects(self) -> tuple[ControlEffect, ...]:
-        """Which way more of each control moves the aircraft at once, rotors and inflow settled.
+        """Which way more of each control moves the aircraft at once, rotors and inflow settled; none on a stand.
 
         Raises
         ------
         LinearizationError
             The model has not all states of the body, or its other states do not settle.
         """
+        if isinstance(self.trim, StandPoint):
+            return ()
         return control_effects(self.quasi_static().b, S.LINEAR_BODY_NAMES, self.control_names, self.control_axes)
 
     def derivatives(self, quasi_static: bool = True) -> dict[str, float]:

@@ -6,7 +6,6 @@ azimuth. `paper` builds them term by term as the paper's eqs. [20] to [34] do, w
 
 from __future__ import annotations  # `help` then shows types by their names
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -15,28 +14,23 @@ from numpy.typing import NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.aircraft.model_records import drive_of, gear
 from sbs_sim.analysis.differences import difference_steps, jacobians, used_states
 from sbs_sim.analysis.kinematics import kinematics
 from sbs_sim.analysis.linear_model import LinearModel
+from sbs_sim.analysis.linear_outputs import load_outputs, relative_spread
 from sbs_sim.analysis.paper_method import blocks
+from sbs_sim.analysis.stand_model import StandModel
 from sbs_sim.analysis.trim import Guess, trim
 from sbs_sim.errors import LinearizationError
-from sbs_sim.flight.trim_point import TrimPoint
-from sbs_sim.model import records as R
+from sbs_sim.flight.trim_point import StandPoint, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
 from sbs_sim.model.elementary import cosine_and_sine
-from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE
-from sbs_sim.model.solve import length
 
 Array = NDArray[np.float64]
 
 METHODS = ("averaged", "paper")
 STEP_SCALES = (1e-3, 10.0)
-LOADS = {R.THRUST: ("thrust", "N"), R.TORQUE: ("torque", "N m")}
-LOADS |= {R.FORCE + i: (f"hub_force_{axis}", "N") for i, axis in enumerate("xyz")}
-LOADS |= {R.MOMENT + i: (f"hub_moment_{axis}", "N m") for i, axis in enumerate("xyz")}
 
 
 def linearize(
@@ -111,6 +105,10 @@ def linearize_trim(
         raise LinearizationError("method = 'paper': allowed with ducts of a fixed exit is averaged")
     if point.parameter_hash != aircraft.parameter_hash:
         raise LinearizationError("point: allowed is a trim of this aircraft, it is one of another")
+    if isinstance(point, StandPoint):
+        if method == "paper":
+            raise LinearizationError("method = 'paper': allowed on a stand is averaged")
+        return StandModel(aircraft, point, step_scale).build()
     model = _averaged(aircraft, point, step_scale)
     if method == "averaged":
         return model
@@ -151,45 +149,23 @@ def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> Linear
         steps=steps[inputs],
         trim=point,
         method="averaged",
-        azimuth_spread=_relative_spread(each[:, :size, :size] - mean[:size, :size], mean[:size, :size], weights),
+        azimuth_spread=relative_spread(each[:, :size, :size] - mean[:size, :size], mean[:size, :size], weights),
         spread=0.5 * np.ptp(each, axis=0)[np.ix_(used, inputs)],
         parameter_hash=aircraft.parameter_hash,
         kinematics=kinematics(point.state, aircraft.body.inertia, aircraft.environment.gravity),
     )
 
 
-def _relative_spread(departures: Array, mean: Array, weights: Array) -> float:
-    """See `LinearModel.azimuth_spread`; weights, shape (n, n), measure every state in its step."""
-    if len(departures) == 1:
-        return math.nan
-    squares = ((departures * weights) ** 2).sum(axis=(1, 2))
-    return math.sqrt(squares.max()) / length((mean * weights).ravel())
-
-
 def _outputs(aircraft: Aircraft, point: TrimPoint, mean: Array) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
     """Rows of C and D by all states and controls, with names and units."""
     size, inputs = len(point.state), mean.shape[1]
-    rows = [*np.eye(inputs)[: S.LINEAR_BODY_SIZE], _climb_row(point, inputs), *mean[size : size + SPECIFIC_FORCE_SIZE]]
-    names = [*S.LINEAR_BODY_NAMES, "climb_rate", *(f"specific_force_{axis}" for axis in "xyz")]
-    units = [*S.LINEAR_BODY_UNITS, "m/s", *("m/s^2",) * SPECIFIC_FORCE_SIZE]
-    loads = mean[size + SPECIFIC_FORCE_SIZE :].reshape(len(aircraft.rotors), R.LOAD_SIZE, inputs)
-    speeds = aircraft.rotor_speeds(aircraft.layout.from_linear(point.state)).tolist()
-    for j in range(len(aircraft.rotors)):
-        rows += [*loads[j], _power_row(aircraft, point, j, speeds[j] * loads[j, R.TORQUE])]
-        names += [f"{LOADS[i][0]}({j + 1})" for i in range(R.LOAD_SIZE)] + [f"power({j + 1})"]
-        units += [LOADS[i][1] for i in range(R.LOAD_SIZE)] + ["W"]
-    return np.stack(rows), tuple(names), tuple(units)
-
-
-def _power_row(aircraft: Aircraft, point: TrimPoint, rotor: int, at_speed: Array) -> Array:
-    """Derivative of the power of a rotor from that at its speed."""
-    if (drive := drive_of(aircraft, aircraft.rotors[rotor])) < 0:
-        return at_speed
-    row = at_speed.copy()
-    row[point.state_names.index(f"{S.SPEED}({drive + 1})")] += (
-        gear(aircraft, aircraft.rotors[rotor]) * point.torque[rotor]
+    rows, names, units = load_outputs(aircraft, point, mean[size:], (*point.state_names, *aircraft.control_names))
+    body = [*np.eye(inputs)[: S.LINEAR_BODY_SIZE], _climb_row(point, inputs)]
+    return (
+        np.stack([*body, *rows]),
+        (*S.LINEAR_BODY_NAMES, "climb_rate", *names),
+        (*S.LINEAR_BODY_UNITS, "m/s", *units),
     )
-    return row
 
 
 def _climb_row(point: TrimPoint, inputs: int) -> Array:

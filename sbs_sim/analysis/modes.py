@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.content import ByContent
-from sbs_sim.model.state import Part, part_of
+from sbs_sim.model.state import DEFLECTIONS, Part, part_of
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -260,9 +260,16 @@ class _States:
     parts: tuple[Part, ...]
 
     @cached_property
+    def is_stand(self) -> bool:
+        """The body is a stand, with deflections among its states."""
+        return not DEFLECTIONS.keys().isdisjoint(self.names)
+
+    @cached_property
     def halves(self) -> list["_Group"]:
-        """Groups of the body."""
+        """Groups of the body; a stand is one."""
         body = self.where(family="body")
+        if self.is_stand:
+            return [_Group("body", False, (), body, {}, {}, {})]
         halves = [np.array([i for i in body if (self.names[i] in LATERAL) == half]) for half in (False, True)]
         return [_Group("body", bool(i), (), half, {}, {}, {}) for i, half in enumerate(halves) if len(half)]
 
@@ -395,7 +402,7 @@ def _choices(found: _Found, groups: Sequence[_Group], states: _States) -> list[l
     """
     leads = found.participation.argmax(axis=1).tolist()
     families = {family: found.sums(places) for family, places in states.families.items()}
-    measures = [(found.largest if group.family == "body" else found.sums)(group.states) for group in groups]
+    measures = [_measures(found, group) for group in groups]
     return [
         _own_choices(
             {family: shares[i] for family, shares in families.items()},
@@ -404,6 +411,22 @@ def _choices(found: _Found, groups: Sequence[_Group], states: _States) -> list[l
         )
         for i, lead in enumerate(leads)
     ]
+
+
+def _measures(found: _Found, group: _Group) -> list[float]:
+    """What every mode has of a group: the largest share of the body's states; the share of the rotors it would name."""
+    if group.family == "body":
+        return found.largest(group.states)
+    total = found.sums(group.states)
+    if len(group.rotors) < 2:
+        return total
+    largest = map(max, zip(*(found.sums(places) for places in group.by_rotor.values()), strict=True))
+    return [_named_share(one, both) for one, both in zip(largest, total, strict=True)]
+
+
+def _named_share(largest: float, total: float) -> float:
+    """Share of the rotor that alone is named, or of all."""
+    return largest if largest > OWNED * total else total
 
 
 def _own_choices(
@@ -458,6 +481,9 @@ def _labels(found: _Found, chosen: Sequence[_Group], speeds: Mapping[int, float]
         if group.family != "body":
             labels |= zip(inside, _rotor_labels(found, inside, group, speeds, states), strict=True)
             continue
+        if states.is_stand:
+            labels |= {i: _Label(_stand_name(found.rows[i], states), "body") for i in inside}
+            continue
         names = (_lateral_names if group.is_lateral else _longitudinal_names)(found, inside, states)
         for i, name in zip(inside, names, strict=True):
             labels[i] = _Label("heave-yaw" if _is_heave_yaw(found, i, states) else name, "body")
@@ -470,6 +496,12 @@ def _drive_name(row: Sequence[float], states: _States) -> str:
     name, _, number = states.names[max(places, key=lambda i: row[i])].partition("(")
     several = len({states.names[i].partition("(")[2] for i in places}) > 1
     return f"{DRIVE_MODES[name]}{', drive ' + number.rstrip(')') if several else ''}"
+
+
+def _stand_name(row: Sequence[float], states: _States) -> str:
+    """Name of a mode after the axis of the stand that has the largest share."""
+    shares = {axis: sum(_shares(row, states, (axis, rate)).values()) for axis, rate in DEFLECTIONS.items()}
+    return f"stand {max(shares, key=lambda axis: shares[axis])}"
 
 
 # --- names of the body's modes ----------------------------------------------------------------------------------

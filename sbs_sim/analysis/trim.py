@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.newton import MAX_UNKNOWN
+from sbs_sim.analysis.stand import rest
 from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.analysis.trim_search import find
 from sbs_sim.analysis.two_loop import solve_by_two_loops
 from sbs_sim.errors import TrimError
-from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
+from sbs_sim.flight.trim_point import Fidelity, StandPoint, TrimCondition, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.state import StateLayout
 
@@ -41,6 +42,9 @@ def trim(
     guess: Guess | None = None,
 ) -> TrimPoint:
     """Trim an aircraft.
+
+    On a stand this is its deflection and the steady motion of the rotors with the controls at what the file holds them
+    at (`controls.NAME.held_deg`), else 0; a condition is a steady motion of the whole stand along locked axes.
 
     Of several trims the ordinary one is found: within the ranges of the controls if there is such a one, without
     stalled rotors, on the branch of hover. A guess finds others.
@@ -66,11 +70,12 @@ def trim(
     Returns
     -------
     TrimPoint
+        Of an aircraft on a stand a `StandPoint`.
 
     Raises
     ------
     TrimError
-        A value out of range, an aircraft on a stand, or no solution: the message says what stops it (rotors that cannot
+        A value out of range, or no solution: the message says what stops it (rotors that cannot
         carry the weight, a rotor that stalls, a control beyond its range), and with the attributes which equation is
         left with what.
     """
@@ -91,10 +96,10 @@ def solve_trim(
     """Trim an aircraft in a flight condition; see `trim`."""
     checks.instance("aircraft", aircraft, Aircraft, TrimError)
     checks.choice("method", method, METHODS, TrimError)
+    if method == "two_loop" and (aircraft.drives or aircraft.body.is_stand):
+        raise TrimError(f"method = 'two_loop': allowed {'with drives' if aircraft.drives else 'on a stand'} is newton")
     if aircraft.body.is_stand:
-        raise TrimError("body.stand: allowed is none for a trim; IsolatedRotor solves a rotor on a stand")
-    if method == "two_loop" and aircraft.drives:
-        raise TrimError("method = 'two_loop': allowed with drives is newton")
+        return rest(aircraft, condition, fidelity, _rest_guess(guess))
     problem = TrimProblem(aircraft, fidelity)
     start = None if guess is None else _start(problem, condition, checked_guess(aircraft, guess))
     if method == "two_loop":
@@ -103,6 +108,13 @@ def solve_trim(
         return problem.point(condition, unknowns, method, outer, inner)
     unknowns, iterations = find(problem, condition, start)
     return problem.point(condition, unknowns, method, iterations)
+
+
+def _rest_guess(guess: Guess | None) -> StandPoint | None:
+    """A rest to begin with; its controls do not count."""
+    if guess is not None and not isinstance(guess, StandPoint):
+        raise TrimError("guess: allowed on a stand is a trim on it")
+    return guess
 
 
 def checked_guess(aircraft: Aircraft, guess: Guess) -> TrimPoint | tuple[Array, Array | None]:

@@ -289,6 +289,21 @@ def _throttle(drive: Drive, speed: float) -> float:
     return min(voltage / drive.full_voltage, 1.0) if drive.full_voltage > 0.0 else HALF
 
 
+def largest_torque(drive: Drive, speed: float) -> float:
+    """Largest steady torque that a drive gives to its rotors at a speed [rad/s], with a full battery [N m]."""
+    if drive.engine == "none":
+        return 0.0
+    throttle = 1.0 if drive.has_governor else drive.throttle
+    most = min(drive.max_torque, drive.max_power / speed)
+    if drive.engine == "electric":
+        voltage = throttle * drive.full_voltage - drive.torque_constant * speed
+        most = min(most, drive.torque_constant * voltage / drive.resistance)
+    else:
+        most *= throttle
+    given = max(most, 0.0) - drive.drag
+    return max(given, 0.0) if drive.free_wheel else given
+
+
 def _drive_states(drive: Drive, speed: float, own: dict[str, float]) -> dict[str, float]:
     """States of a drive of its unknowns, as `sbs_sim.model.balance.set_drives` has them."""
     scaled = {S.SPEED: speed * (1.0 + own[S.SPEED]), S.ENGINE_TORQUE: drive.max_torque * own.get(S.ENGINE_TORQUE, 0.0)}

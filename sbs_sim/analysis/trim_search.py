@@ -9,12 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft.model_records import MIN_DENSITY
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.model_records import MIN_DENSITY, drive_of, gear
 from sbs_sim.analysis.newton import newton
 from sbs_sim.analysis.trim_guess import MomentumTheory
-from sbs_sim.analysis.trim_problem import ATTITUDE_UNKNOWNS, BODY_UNKNOWNS, TrimProblem
+from sbs_sim.analysis.trim_problem import ATTITUDE_UNKNOWNS, BODY_UNKNOWNS, TrimProblem, largest_torque
 from sbs_sim.errors import TrimError
 from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.model import records as R
 
 Array = NDArray[np.float64]
 Along = Callable[[float], tuple[TrimProblem, TrimCondition]]
@@ -250,7 +252,7 @@ class _Search:
 
     def _failure(self) -> TrimError:
         """What stops the trim, in one line: what is missing, how far the paths lead, what is left."""
-        error, reasons = self._error, self._missing()
+        error, reasons = self._error, [*self._missing(), *self._weak_drives()]
         if self._path:
             error, at = self._path.error, self._condition.scaled(self._path.share)
             text = (
@@ -291,6 +293,29 @@ class _Search:
         if weakest.max() < MOSTLY:
             return ["the controls do not set lift, rolling, pitching and yawing moment apart from each other"]
         return [f"no control sets the {BALANCES[int(np.argmax(weakest))]}"]
+
+    def _weak_drives(self) -> list[str]:
+        """Drives that do not give the torque that the flight takes with the speeds of the file."""
+        aircraft = self._problem.aircraft
+        if not aircraft.drives:
+            return []
+        fixed = Aircraft.from_dict({**aircraft.data, "drives": []}, aircraft.folder)
+        kept = TrimProblem(fixed, self._problem.fidelity)
+        try:
+            unknowns, _ = find(kept, self._condition)
+        except TrimError:
+            return []  # it is not the drives
+        kept.residual(self._condition, unknowns)
+        torques = kept.loads[:, R.TORQUE].tolist()
+        found = []
+        for i, drive in enumerate(aircraft.drives):
+            pairs = zip(aircraft.rotors, torques, strict=True)
+            taken = sum(gear(aircraft, rotor) * torque for rotor, torque in pairs if drive_of(aircraft, rotor) == i)
+            most = largest_torque(drive, aircraft.drive_speed(i))
+            if taken > most:
+                rotors = f"its rotors take {taken:.3g} N m at the speed of the file"
+                found.append(f"drive {i + 1} gives up to {most:.3g} N m, {rotors}")
+        return found
 
     def _strain(self, condition: TrimCondition, unknowns: Array) -> str:
         """What is at its limit there: rotors that stall, and controls beyond their ranges."""

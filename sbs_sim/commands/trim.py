@@ -72,18 +72,29 @@ def print_trim(craft: "Aircraft", point: "TrimPoint", effects: "Sequence[Control
     rows = [
         ["pitch [deg]", fixed(point.pitch * DEGREES, 4), "", "nose up"],
         ["roll [deg]", fixed(point.roll * DEGREES, 4), "", "right side down"],
+        *_deflection_rows(point),
     ]
-    for effect, value in zip(effects, point.controls.tolist(), strict=True):
-        control = craft.controls[craft.control_names.index(effect.control)]
+    moves = {effect.control: f"{effect.axis}: {effect.words}" for effect in effects}
+    for control, value in zip(craft.controls, point.controls.tolist(), strict=True):
         low, high = (control.shown(limit) for limit in control.range)
-        heading, moves = f"{control.name} [{control.shown_unit}]", f"{effect.axis}: {effect.words}"
-        rows.append([heading, fixed(control.shown(value), 4), f"{low:g} to {high:g}", moves])
+        heading = f"{control.name} [{control.shown_unit}]"
+        rows.append([heading, fixed(control.shown(value), 4), f"{low:g} to {high:g}", moves.get(control.name, "held")])
     print_table(["body and controls", "", "range", "effect of an increase"], rows, left=(0, 3))
     print()
     print_table(["rotors", *(rotor.name for rotor in craft.rotors)], _rotor_rows(craft, point))
     print()
     print(f"power of all rotors {point.power.sum():.2f} W")
     print_limits(point)
+
+
+def _deflection_rows(point: "TrimPoint") -> list[list[str]]:
+    """Heading and position of a stand that gives way."""
+    from sbs_sim.flight.trim_point import StandPoint
+
+    if not isinstance(point, StandPoint):
+        return []
+    rows = [["yaw [deg]", fixed(point.heading * DEGREES, 4), "", "nose right"]]
+    return rows + [[f"{axis} [m]", fixed(value, 6), "", ""] for axis, value in zip("xyz", point.position, strict=True)]
 
 
 def _rotor_rows(craft: "Aircraft", point: "TrimPoint") -> list[list[str]]:

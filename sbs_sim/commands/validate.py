@@ -71,7 +71,11 @@ def _print_report(report: "Report") -> None:
         for label, text in f.paragraphs(case):
             _print_wrapped(f"{label}: ", text)
         print()
-        print_table(f.HEADINGS, [f.row_cells(row) for row in case.rows], left=f.TEXT_COLUMNS)
+        if case.rows:
+            print_table(f.HEADINGS, [f.row_cells(row) for row in case.rows], left=f.TEXT_COLUMNS)
+        for table in case.tables:
+            print_table(f.table_headings(table), f.table_cells(table), left=f.TABLE_TEXT_COLUMNS)
+            print()
         for label, text in f.remarks(case):
             _print_wrapped(f"{label}: ", text)
     print()

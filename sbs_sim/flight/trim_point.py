@@ -236,3 +236,29 @@ class TrimPoint(ByContent):
 
     def _repr_html_(self) -> str:
         return trim_html(self)
+
+
+@dataclass(frozen=True, eq=False)
+class StandPoint(TrimPoint):
+    """Rest of an aircraft on a stand under given controls.
+
+    Attributes
+    ----------
+    position : ndarray, shape (3,)
+        Deflection of the stand, NED [m].
+    heading : float
+        Its angle about the vertical, from north to east [rad]; those of pitch and roll are `pitch` and `roll`.
+    """
+
+    position: Array
+    heading: float
+
+    def __getitem__(self, name: str) -> Any:
+        """Value of a name, see `TrimPoint`; "psi" is the heading."""
+        return self.heading if name == "psi" else super().__getitem__(name)
+
+    def simulation_state(self, layout: S.StateLayout) -> Array:
+        """Simulation state, shape (size,)."""
+        state = layout.from_linear(self.state, self.heading)
+        state[S.POSITION : S.ATTITUDE] = self.position
+        return state

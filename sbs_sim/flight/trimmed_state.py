@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SimulationError
-from sbs_sim.flight.trim_point import TrimPoint
+from sbs_sim.flight.trim_point import StandPoint, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
 
@@ -34,6 +34,7 @@ def trimmed_state(
         NED [m].
     heading : float
         From north to east [rad].
+        On a stand both are those of the rest, and must not be given.
     wind : array_like, shape (3,)
         Steady wind, NED [m/s]; the aircraft is trimmed relative to the air and drifts with it.
 
@@ -44,17 +45,21 @@ def trimmed_state(
     Raises
     ------
     SimulationError
-        A trim of an aircraft with other rotors; an aircraft on a stand; a heading that is not finite or far from a
-        turn. Position and velocity are checked by `Simulation`.
+        A trim of an aircraft with other rotors; one that is no rest of a stand for an aircraft on a stand; a heading
+        that is not finite or far from a turn. Position and velocity are checked by `Simulation`.
     """
-    if aircraft.body.is_stand:
-        raise SimulationError("body.stand: allowed is none for a start from a trim; give a state on a stand")
+    if aircraft.body.is_stand and not isinstance(point, StandPoint):
+        raise SimulationError("body.stand: allowed on a stand is a start from a trim on it, or give a state")
     if point.state_names != aircraft.layout.linear_names:
         own = ", ".join(str(rotor.blades) for rotor in aircraft.rotors)
         raise SimulationError(
             f"start: a trim with {len(point.state_names)} states: allowed is one of an aircraft with {own} blades, with"
             f" {aircraft.layout.linear_size}"
         )
+    if isinstance(point, StandPoint):
+        if np.any(position) or heading:
+            raise SimulationError("position, heading: allowed is none for a start from the rest of a stand")
+        return point.simulation_state(aircraft.layout)
     heading = checks.number("heading", heading, -4 * math.pi, 4 * math.pi, "rad", SimulationError)
     state = aircraft.layout.from_linear(point.state, heading)
     state[: S.ATTITUDE] = position

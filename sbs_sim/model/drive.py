@@ -27,21 +27,15 @@ from sbs_sim.lanes import (
 from sbs_sim.model import state as S
 from sbs_sim.model.blade import ForceMoment
 from sbs_sim.model.dynamics import (
-    body_loads,
     body_motion,
-    hold_locked_axes,
     locked_loads,
     memory_in_lanes,
     scaled,
-    set_blade_terms,
-    set_body_rates,
     set_hub_loads,
-    set_hub_velocities,
-    set_rotor_rates,
+    set_known_loads,
+    set_rates,
     solve_blades,
-    solve_on_stand,
-    solve_with_blades,
-    sum_blades,
+    solve_coupled_body,
     symmetric,
     symmetric_products,
     times,
@@ -91,27 +85,19 @@ def driven_derivative(model, x, swash, psi, wind, work, dx, with_loads):
         memory.state[i] = given[i]
     set_turning(aircraft, memory.state, kept, drives, as_lanes(psi, like), turning)
     flight = body_motion(aircraft, memory.state, as_lanes(wind, like))
-    set_blade_terms(aircraft, memory, flight, as_lanes(swash, like), turning[AZIMUTHS])
-    sum_blades(aircraft, memory)
-    set_hub_velocities(aircraft, memory, flight)
-    loads = transmission_loads(memory.state, drives, flight, body_loads(aircraft, memory, flight))
+    loads = set_known_loads(aircraft, memory, flight, as_lanes(swash, like), turning[AZIMUTHS])
+    loads = transmission_loads(memory.state, drives, flight, loads)
     for i in range(drives.shape[0]):
         set_drive_rates(memory.state, drives[i], shafts[i], out)
         eliminate(aircraft, memory, drives, i, shafts[i])
-    if aircraft.switches[0].stand == 1:
-        solve_on_stand(aircraft, memory, flight, loads)
-    else:
-        solve_with_blades(aircraft, memory, loads)
+    solve_coupled_body(aircraft, memory, flight, loads)
     solve_blades(aircraft, memory)
     solve_shafts(aircraft, memory, drives, shafts, turning, out)
     turn_blades(aircraft, memory, turning)
     if with_loads:
         set_hub_loads(aircraft, memory)
         add_shaft_loads(aircraft, memory, turning)
-    set_body_rates(memory, flight, out)
-    if aircraft.switches[0].stand == 1:
-        hold_locked_axes(aircraft, out)
-    set_rotor_rates(aircraft, memory, out)
+    set_rates(aircraft, memory, flight, out)
     add_speeding_terms(aircraft, memory, turning, out)
 
 

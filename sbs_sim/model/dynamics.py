@@ -194,15 +194,9 @@ def memory_in_lanes(work):
 def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
     """Set the derivative of `memory.state`."""
     flight = body_motion(aircraft, memory.state, wind)
-    set_blade_terms(aircraft, memory, flight, swash, psi)
-    sum_blades(aircraft, memory)
-    set_hub_velocities(aircraft, memory, flight)
-    loads = body_loads(aircraft, memory, flight)
+    loads = set_known_loads(aircraft, memory, flight, swash, psi)
     if aircraft.switches[0].complete_coupling == 1:
-        if aircraft.switches[0].stand == 1:
-            solve_on_stand(aircraft, memory, flight, loads)
-        else:
-            solve_with_blades(aircraft, memory, loads)
+        solve_coupled_body(aircraft, memory, flight, loads)
         solve_blades(aircraft, memory)
         if with_loads:
             set_hub_loads(aircraft, memory)
@@ -210,6 +204,30 @@ def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
         solve_blades_alone(aircraft, memory)
         set_hub_loads(aircraft, memory)
         solve_body_alone(aircraft, memory, loads)
+    set_rates(aircraft, memory, flight, dx)
+
+
+@kernel
+def set_known_loads(aircraft, memory, flight, swash, psi):
+    """Set what is known before the accelerations are, of blades and hubs; the loads on the rigid part."""
+    set_blade_terms(aircraft, memory, flight, swash, psi)
+    sum_blades(aircraft, memory)
+    set_hub_velocities(aircraft, memory, flight)
+    return body_loads(aircraft, memory, flight)
+
+
+@kernel
+def solve_coupled_body(aircraft, memory, flight, loads):
+    """Set specific force and angular acceleration of the body or of a stand, all blades eliminated (`complete`)."""
+    if aircraft.switches[0].stand == 1:
+        solve_on_stand(aircraft, memory, flight, loads)
+    else:
+        solve_with_blades(aircraft, memory, loads)
+
+
+@kernel
+def set_rates(aircraft, memory, flight, dx):
+    """Set the rates of body and rotors from the accelerations."""
     set_body_rates(memory, flight, dx)
     if aircraft.switches[0].stand == 1:
         hold_locked_axes(aircraft, dx)

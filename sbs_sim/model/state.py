@@ -37,6 +37,8 @@ LINEAR_BODY_SIZE = 8
 LINEAR_U, LINEAR_W, LINEAR_Q, LINEAR_THETA, LINEAR_V, LINEAR_P, LINEAR_PHI, LINEAR_R = range(LINEAR_BODY_SIZE)
 LINEAR_BODY_NAMES = ("u", "w", "q", "theta", "v", "p", "phi", "r")
 LINEAR_BODY_UNITS = ("m/s", "m/s", "rad/s", "rad", "m/s", "rad/s", "rad", "rad/s")
+# deflections of a stand along and about the axes, with the velocities that are their rates
+DEFLECTIONS = {"x": "u", "y": "v", "z": "w", "roll": "p", "pitch": "q", "yaw": "r"}
 CONTROL_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")
 CONTROL_AXES = ("heave", "roll", "pitch", "yaw")  # that a pilot moves with them
 EULER_NAMES, AIRSPEED = ("psi", "theta", "phi"), "V"  # outputs that follow from a simulation state
@@ -109,14 +111,14 @@ def part_of(name: str) -> Part:
     Parameters
     ----------
     name : str
-        One of `StateLayout.linear_names`.
+        One of `StateLayout.linear_names`, or of `DEFLECTIONS`.
 
     Raises
     ------
     ValueError
         No linear state has this name.
     """
-    if name in LINEAR_BODY_NAMES:
+    if name in LINEAR_BODY_NAMES or name in DEFLECTIONS:
         return Part("body", 0, -1)
     match = _ROTOR_STATE.fullmatch(name)
     if match is None:

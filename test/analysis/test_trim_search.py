@@ -494,6 +494,27 @@ def test_what_no_weight_makes_possible_is_told_by_momentum_theory(uh60a):
     assert float(text.split("coefficient of ")[1].split(" ")[0]) > 3.0
 
 
+@pytest.mark.parametrize(
+    ("engine", "most"),
+    [
+        ({"kind": "engine", "max_torque": 3.0}, 3.0),
+        ({"kind": "engine", "max_torque": 30.0, "max_power": 500.0}, 500.0 / (80 * math.pi)),
+        ({"kind": "none"}, 0.0),
+    ],
+)
+def test_a_drive_that_is_too_weak_is_told_with_what_the_rotors_take(sbs, engine, most):
+    """The torque at constant speed beside the largest of the drive; a strong one trims."""
+    governor = {"integral_gain": 2.0, "proportional_gain": 2.0}
+    data = aircraft_data() | {"drives": [{"rotors": ["R1", "R2"], "engine": engine, "governor": governor}]}
+    with pytest.raises(TrimError) as error:
+        trim(Aircraft.from_dict(data))
+    taken = trim(sbs).torque.sum()
+    told = f"no trim: drive 1 gives up to {most:.3g} N m, its rotors take {taken:.3g} N m at the speed of the file; "
+    assert told in str(error.value)
+    data["drives"][0]["engine"] = {"kind": "engine", "max_torque": 1.2 * taken}
+    assert trim(Aircraft.from_dict(data)).torque.sum() == pytest.approx(taken, rel=1e-3)
+
+
 def test_every_equation_has_words(sbs):
     problem = TrimProblem(sbs, Fidelity())
     words = [problem.balance(row) for row in np.eye(len(problem.equations))]

@@ -1,12 +1,12 @@
 """Rotors whose speed is a state: against the plain model at given speeds, and by what is conserved (section 7.6)."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from balances import at_speeds, azimuths, ratios, totals
 from helpers import VACUUM, WEIGHTLESS_VACUUM, Model, aircraft_data, unit
-from plain_model import energy, momentum, plain_derivative, rotation_matrix
+from plain_model import plain_derivative
 
 from sbs_sim import Aircraft
 from sbs_sim.errors import AircraftError
@@ -46,49 +46,6 @@ def tumbling_state(model, speeds, seed=1, angle=0.05, rate=5.0, inflow=0.0):
     for i, speed in enumerate(speeds):
         x[layout.drive(i)["Omega"]] = speed
     return x
-
-
-def ratios(aircraft):
-    """Number of the drive of each rotor, and its gear ratio, worked out anew from the file."""
-    speeds = {rotor.name: rotor.speed for rotor in aircraft.rotors}
-    return [
-        next((i, speeds[rotor.name] / speeds[drive.rotors[0]]) for i, drive in enumerate(aircraft.drives)
-             if rotor.name in drive.rotors)
-        for rotor in aircraft.rotors
-    ]  # fmt: skip
-
-
-def at_speeds(aircraft, x, rates=None):
-    """Return the aircraft for the plain model with the speeds of a state and given accelerations of the drives."""
-    rotors = []
-    for rotor, (i, gear) in zip(aircraft.rotors, ratios(aircraft), strict=True):
-        values = {name: getattr(rotor, name) for name in dir(rotor) if not name.startswith("_")}
-        values["inflow_speed"], values["speed"] = rotor.speed, gear * x[aircraft.layout.drive(i)["Omega"]]
-        values["speed_rate"] = 0.0 if rates is None else gear * rates[i]
-        rotors.append(SimpleNamespace(**values))
-    plain = {name: getattr(aircraft, name) for name in ("environment", "body", "options", "airfoils")}
-    return SimpleNamespace(**plain, rotors=tuple(rotors))
-
-
-def azimuths(aircraft, x, psi0):
-    """Return the azimuth of every rotor."""
-    return np.array([
-        start + gear * x[aircraft.layout.drive(i)["azimuth"]]
-        for start, (i, gear) in zip(psi0, ratios(aircraft), strict=True)
-    ])  # fmt: skip
-
-
-def totals(aircraft, x, psi0):
-    """Linear and angular momentum, NED, and energy of body, blades and transmissions."""
-    plain, size = at_speeds(aircraft, x), aircraft.layout.drives_start
-    psi = azimuths(aircraft, x, psi0)
-    p, h = momentum(plain, x[:size], psi)
-    total = energy(plain, x[:size], psi)
-    for i, drive in enumerate(aircraft.drives):
-        speed = x[aircraft.layout.drive(i)["Omega"]]
-        h = h + rotation_matrix(x[S.ATTITUDE : S.VELOCITY]) @ (drive.inertia * speed * drive.inertia_axis)
-        total += drive.inertia * speed * (speed / 2 + drive.inertia_axis @ x[S.RATES : S.BODY_SIZE])
-    return p, h, total
 
 
 @pytest.mark.parametrize("lead_lag", [True, False])

@@ -247,6 +247,10 @@ def mirrored_data(data):
         rotor["hub"] = (POLAR * rotor["hub"]).tolist()
         rotor["shaft_direction"] = (POLAR * rotor["shaft_direction"]).tolist()
         rotor["rotation"] = -rotor["rotation"]
+        if "lateral_cyclic" in rotor.get("swashplate_offset_deg", {}):
+            rotor["swashplate_offset_deg"]["lateral_cyclic"] *= -1.0
+    for drive in image.get("drives", []):
+        drive["inertia_axis"] = (AXIAL * drive.get("inertia_axis", [0.0, 0.0, 0.0])).tolist()
     for surface in image["body"].get("surfaces", []):
         surface["position"] = (POLAR * surface["position"]).tolist()
         surface["dihedral_deg"] = -surface["dihedral_deg"]

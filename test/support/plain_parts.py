@@ -42,7 +42,7 @@ def wash(ac, part, air_velocity, rate, inflow):
     turned = np.array([1.0, 0, 0])
     ahead = turned * cosine + np.cross(axis, turned) + axis * (axis @ turned) / (1 + cosine)
     velocity = air_velocity + np.cross(rate, rotor.hub)
-    induced = rotor.speed * rotor.radius * inflow[j][0]
+    induced = getattr(rotor, "inflow_speed", rotor.speed) * rotor.radius * inflow[j][0]
     skew = np.arctan2(velocity @ ahead, abs(induced + velocity @ up))
     aft = np.broadcast_to(part.aft, np.shape(part.skew))
     return induced * (np.interp(skew, part.skew, aft) * ahead + np.interp(skew, part.skew, part.down) * up)

@@ -1,12 +1,14 @@
 """Random helicopters, and whether `trim` finds every steady flight that they have.
 
     ./run python tools/robustness/trim_fleet.py [--aircraft 500] [--seed 1] [--starts 20] [--seconds 5] [--workers 2]
+    ./run python tools/robustness/trim_fleet.py --equipped
 
 Conventional, tandem, side-by-side, quadrotor and coaxial aircraft (test/support/random_aircraft.py), each in hover,
-forward flight and one other. What is found must fulfil the complete equations and fly on for a revolution. What is not
-found is looked for by another way: least squares from random attitudes, controls and inflows all over the ranges. The
-same search after every tenth flight that was found tells how much it sees. The exit code is 1 if it finds a flight
-without stalled rotors that `trim` does not, or if something found is no trim.
+forward flight and one other; or, equipped, those of tools/robustness/generality.py with every key. What is found must
+fulfil the complete equations and fly on for a revolution. What is not found is looked for by another way: least squares
+from random attitudes, controls and inflows all over the ranges. The same search after every tenth flight that was found
+tells how much it sees. The exit code is 1 if it finds a flight without stalled rotors that `trim` does not, or if
+something found is no trim.
 """
 
 import argparse
@@ -26,7 +28,8 @@ from scipy.optimize import least_squares
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test" / "support"))
 
-from random_aircraft import GRAVITY, KINDS, random_flights  # noqa: E402
+from random_aircraft import GRAVITY, random_flights  # noqa: E402
+from random_options import equipped_flights  # noqa: E402
 
 from sbs_sim import Aircraft, simulate, trim  # noqa: E402
 from sbs_sim.analysis import trim_problem  # noqa: E402
@@ -67,10 +70,12 @@ class Outcome:
     milliseconds: float = 0.0
 
 
-def solve(job: tuple[int, int, int, float]) -> list[Outcome]:
+def solve(job: tuple[bool, int, int, int, float]) -> list[Outcome]:
     """All flights of one aircraft."""
-    seed, number, starts, seconds = job
-    kind, aircraft, flights = random_flights(seed, number)
+    equipped, seed, number, starts, seconds = job
+    kind, aircraft, flights = (equipped_flights if equipped else random_flights)(seed, number)
+    if aircraft.body.is_stand:  # it does not fly
+        return []
     found = []
     for i, (flight, condition) in enumerate(flights.items()):
         other = Other(aircraft, TrimCondition(**condition), (seed, number, i), starts, seconds)
@@ -119,7 +124,9 @@ def _fault(aircraft: Aircraft, point: TrimPoint, residual: np.ndarray, word: str
     if word == STALL or point.beyond_limits:
         return ""
     duration = math.ceil(100 * 2 * math.pi / min(rotor.speed for rotor in aircraft.rotors)) / 100  # in whole ticks
-    flown = simulate(aircraft, point, point.controls, duration)
+    # the default method takes the speeds of rotors for constant
+    options = {"method": "rk4"} if aircraft.drives else {}
+    flown = simulate(aircraft, point, point.controls, duration, **options)
     gained = max(abs(float(flown[axis][-1] - flown[axis][0])) for axis in "uvw")
     share = gained / (GRAVITY * duration)
     return f"it gains {share:.2g} of a free fall" if share > DEPARTURE else ""
@@ -167,7 +174,9 @@ class Other:
     def _random_start(self) -> np.ndarray:
         """Attitude, controls all over their ranges or in the middle of them, coning and inflow."""
         problem, rng, x = self._problem, self._rng, np.zeros(self._problem.layout.size)
-        low, high = np.array(list(problem.aircraft.control_ranges.values())).T
+        low, high = (
+            problem.aircraft.trim_unknowns(end) for end in np.array([*problem.aircraft.control_ranges.values()]).T
+        )
         controls = rng.uniform(low, high) * rng.choice([0.4, 1.0])
         for j in range(len(problem.aircraft.rotors)):
             x[problem.layout.flap(j).start] = rng.uniform(0.0, 0.1)
@@ -182,7 +191,8 @@ class Other:
     def unknowns(self, point: TrimPoint) -> np.ndarray:
         """Unknowns of a trim."""
         x = self._problem.layout.from_linear(point.state)
-        return self._problem.unknowns(point.pitch, point.roll, point.controls, x)
+        controls = self._problem.aircraft.trim_unknowns(point.controls)
+        return self._problem.unknowns(point.pitch, point.roll, controls, x)
 
     def word(self, unknowns: np.ndarray) -> str:
         """Whether a solution is an ordinary flight."""
@@ -208,10 +218,11 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="(default: 1)")
     parser.add_argument("--starts", type=int, default=20, help="of the other search (default: 20)")
     parser.add_argument("--seconds", type=float, default=5.0, help="of the other search for a flight (default: 5)")
+    parser.add_argument("--equipped", action="store_true", help="aircraft with every key of an aircraft file")
     parser.add_argument("--workers", type=int, default=2, help="processes (default: 2)")
     arguments = parser.parse_args()
     numbers = range(arguments.first, arguments.first + arguments.aircraft)
-    jobs = [(arguments.seed, number, arguments.starts, arguments.seconds) for number in numbers]
+    jobs = [(arguments.equipped, arguments.seed, number, arguments.starts, arguments.seconds) for number in numbers]
     outcomes: list[Outcome] = []
     with ProcessPoolExecutor(arguments.workers) as pool:
         for found in pool.map(solve, jobs):
@@ -227,7 +238,7 @@ def main() -> int:
 def _print_table(outcomes: list[Outcome]) -> int:
     words = (ORDINARY, BEYOND, STALL, NONE, MISSED, WRONG)
     print("\n| kind | flights | " + " | ".join(words) + " |\n|" + "---|" * (2 + len(words)))
-    for kind in (*KINDS, "all"):
+    for kind in (*dict.fromkeys(outcome.kind for outcome in outcomes), "all"):
         counts = collections.Counter(outcome.word for outcome in outcomes if kind in (outcome.kind, "all"))
         row: list[Any] = [kind.replace("_", "-"), counts.total(), *(counts[word] for word in words)]
         print("| " + " | ".join(str(cell) for cell in row) + " |")

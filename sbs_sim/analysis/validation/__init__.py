@@ -30,6 +30,7 @@ CASES = (
     "ormiston_hodges",
     "pca2",
     "uh60a",
+    "uh60a_genhel",
 )  # modules of this package, in the order in which they are shown
 MODEL = (
     "One model and one set of options for all cases: rigid blades on hinges, 20 elements of a blade, airfoil tables"

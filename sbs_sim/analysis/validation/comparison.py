@@ -80,6 +80,24 @@ class Row:
 
 
 @dataclass(frozen=True)
+class Table:
+    """Values of this program without published ones beside them.
+
+    Attributes
+    ----------
+    title : str
+    conditions : tuple of str
+        One of each column.
+    rows : tuple of (str, str, tuple of float)
+        Quantity, unit, and a value for each condition.
+    """
+
+    title: str
+    conditions: tuple[str, ...]
+    rows: tuple[tuple[str, str, tuple[float, ...]], ...]
+
+
+@dataclass(frozen=True)
 class Case:
     """What one source has published beside ours.
 
@@ -93,6 +111,8 @@ class Case:
     rows : tuple of Row
     remarks : tuple of str
         Why aims are not met, in physics, and what would move it.
+    tables : tuple of Table
+        What is computed without published values.
     """
 
     name: str
@@ -102,6 +122,7 @@ class Case:
     substitutes: tuple[str, ...]
     rows: tuple[Row, ...]
     remarks: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -178,7 +199,13 @@ def _case_entry(case: Case) -> dict[str, Any]:
         **_spread_entry(case.rows),
         "rows": [_row_entry(row) for row in case.rows],
         "remarks": list(case.remarks),
+        "tables": [_table_entry(table) for table in case.tables],
     }
+
+
+def _table_entry(table: Table) -> dict[str, Any]:
+    rows = [{"quantity": name, "unit": unit, "values": list(values)} for name, unit, values in table.rows]
+    return {"title": table.title, "conditions": list(table.conditions), "rows": rows}
 
 
 def _row_entry(row: Row) -> dict[str, Any]:

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from html import escape
 
 from sbs_sim.analysis.html import document, plain_table, text_of
-from sbs_sim.analysis.validation.comparison import MET, MISSED, Case, Report, Row, spread
+from sbs_sim.analysis.validation.comparison import MET, MISSED, Case, Report, Row, Table, spread
 
 TITLE = "Published results beside ours"
 HEADINGS = ("", "at", "unit", "published", "ours", "difference", "in %", "aim", "")
 SUMMARY_HEADINGS = ("case", "aims met", "aims missed", "compared only", "median difference", "worst difference")
-TEXT_COLUMNS = (0, 1, 2, 8)
+TEXT_COLUMNS, TABLE_TEXT_COLUMNS = (0, 1, 2, 8), (0, 1)
 DIGITS = 4
 
 
@@ -32,6 +32,16 @@ def row_cells(row: Row) -> list[str]:
     note = "; ".join(part for part in (verdict, row.remark) if part)
     values = [number(row.published), number(row.ours), number(row.difference)]
     return [row.quantity, row.condition, "" if row.unit == "1" else row.unit, *values, signed, aim, note]
+
+
+def table_headings(table: Table) -> tuple[str, ...]:
+    """Headings of values without published ones."""
+    return (table.title, "unit", *table.conditions)
+
+
+def table_cells(table: Table) -> list[list[str]]:
+    """Cells of all rows under `table_headings`."""
+    return [[name, "" if unit == "1" else unit, *map(number, values)] for name, unit, values in table.rows]
 
 
 def summary_rows(report: Report) -> list[list[str]]:
@@ -77,8 +87,9 @@ def page_text(report: Report) -> str:
 
 
 def _case_html(case: Case) -> str:
-    table = plain_table("", HEADINGS, [row_cells(row) for row in case.rows])
-    return f"{_list(paragraphs(case))}\n{table}\n{_list(remarks(case))}"
+    tables = [plain_table("", HEADINGS, [row_cells(row) for row in case.rows])] if case.rows else []
+    tables += [plain_table("", table_headings(table), table_cells(table)) for table in case.tables]
+    return "\n".join([_list(paragraphs(case)), *tables, _list(remarks(case))])
 
 
 def _list(entries: Sequence[tuple[str, str]]) -> str:
@@ -91,7 +102,9 @@ def markdown(report: Report) -> str:
     parts = [f"# {TITLE}\n\n{report.model}\n", _markdown_table(SUMMARY_HEADINGS, summary_rows(report))]
     for case in report.cases:
         parts += [f"## {case.title}\n", _markdown_list(paragraphs(case))]
-        parts += [_markdown_table(HEADINGS, [row_cells(row) for row in case.rows]), _markdown_list(remarks(case))]
+        parts += [_markdown_table(HEADINGS, [row_cells(row) for row in case.rows])] if case.rows else []
+        parts += [_markdown_table(table_headings(table), table_cells(table)) for table in case.tables]
+        parts += [_markdown_list(remarks(case))]
     return "\n".join(part for part in parts if part)
 
 

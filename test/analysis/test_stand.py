@@ -140,8 +140,10 @@ def test_what_a_stand_does_not_allow_is_refused_in_a_line(hammond, sbs, hover):
 
 
 def driven_rotor():
-    """Return a rotor with a drive."""
-    return Aircraft.from_dict(aircraft_data(rotors=[{}]) | {"drives": [{"rotors": ["R1"]}]})
+    """Return a rotor with an engine."""
+    return Aircraft.from_dict(
+        aircraft_data(rotors=[{}]) | {"drives": [{"rotors": ["R1"], "engine": {"kind": "engine", "max_torque": 8.0}}]}
+    )
 
 
 def test_the_command_prints_the_rest():

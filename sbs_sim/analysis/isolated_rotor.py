@@ -80,13 +80,15 @@ class IsolatedRotor:
     Raises
     ------
     TrimError
-        The aircraft has several rotors.
+        The aircraft has several rotors, or drives.
     """
 
     def __init__(self, aircraft: Aircraft, fidelity: Fidelity | None = None) -> None:
         checks.instance("aircraft", aircraft, Aircraft, TrimError)
         if len(aircraft.rotors) != 1:
             raise TrimError(f"rotors: {len(aircraft.rotors)} of them; allowed is one that stands alone")
+        if aircraft.drives:
+            raise TrimError("drives: allowed is none for a rotor that stands alone, its speed is given")
         self.aircraft, self.fidelity = aircraft, fidelity or Fidelity()
         self.rotor, self.layout = aircraft.rotors[0], aircraft.layout
         self._free = np.flatnonzero(aircraft.body.stand_free) if aircraft.body.is_stand else np.zeros(0, dtype=np.int64)

@@ -60,9 +60,10 @@ def simulate(
     -------
     History
         Mapping of names to arrays, over the n instants between and at the ends of n - 1 ticks: "time" (n,) [s],
-        "controls" (n, n_controls), "swashplate" (n, n_rotors, 3) [rad], "acceleration" (n, 3) [m/s^2], "thrust" [N],
-        "torque" [N m], "power" [W] (n, n_rotors), "state" (n, size) and every name of the simulation state (n,), "phi",
-        "theta", "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed relative to the air [m/s].
+        "controls" (n, n_controls), "swashplate" (n, n_rows, 3) [rad], see `Aircraft.mix`, "acceleration" (n, 3)
+        [m/s^2], "thrust" [N], "torque" [N m], "power" [W] (n, n_rotors), "state" (n, size) and every name of the
+        simulation state (n,), "phi", "theta", "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed
+        relative to the air [m/s].
         `warnings` tells where the model does not hold.
 
     Raises

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.commands import row_problems
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.formation import Flown, Formation
@@ -64,8 +65,8 @@ class Simulation:
     aircraft : Aircraft
     state : ndarray, shape (size,)
         Simulation state at the start.
-    swashplate : ndarray, shape (n_rotors, 3)
-        Angles until others are set [rad].
+    swashplate : ndarray, shape (n_rows, 3)
+        Angles until others are set [rad], see `Aircraft.mix`.
     tick : float
         Length of a tick [s], 1e-4 to 1.
     azimuth_step : float
@@ -233,7 +234,9 @@ class Simulation:
         return values
 
     def checked_swashplate(self, angles: ArrayLike) -> Array:
-        """Copy of the swashplate angles of all rotors [rad], shape (n_rotors, 3), if each is within its range.
+        """Copy of the swashplate angles of all rotors [rad], shape (n_rows, 3), if each is within its range.
+
+        The rows are those of `Aircraft.mix`.
 
         Raises
         ------
@@ -241,17 +244,15 @@ class Simulation:
             Naming rotor, angle, value and range.
         """
         values = checks.array("swashplate", angles, SimulationError)
-        rotors = self.aircraft.rotors
-        if values.shape != (len(rotors), 3):
+        rows = self.aircraft.rows
+        if values.shape != (len(rows), 3):
             if values.ndim == 2 and values.shape[1] == 3:
-                allowed = f"{len(rotors)}, those of the aircraft"
-                raise SimulationError(f"swashplate has {len(values)} rotors: allowed are {allowed}")
-            raise SimulationError(f"swashplate has shape {values.shape}: allowed is {(len(rotors), 3)}")
-        for rotor, row in zip(rotors, values, strict=True):
-            ranges = (rotor.collective_range, rotor.cyclic_range, rotor.cyclic_range)
-            for name, value, (low, high) in zip(S.SWASHPLATE_NAMES, row, ranges, strict=True):
-                if not low - 1e-12 <= value <= high + 1e-12:
-                    raise SimulationError(f"{rotor.name} {name} = {value}: allowed are {low:.6g} to {high:.6g} rad")
+                drives = " and drives that controls act on" if self.aircraft.commanded_drives else ""
+                allowed = f"{len(rows)}, those of the aircraft{drives}"
+                raise SimulationError(f"swashplate has {len(values)} rotors{drives}: allowed are {allowed}")
+            raise SimulationError(f"swashplate has shape {values.shape}: allowed is {(len(rows), 3)}")
+        for name, value, (low, high), unit in row_problems(rows, values):
+            raise SimulationError(f"{name} = {value}: allowed are {low:.6g} to {high:.6g} {unit}".removesuffix(" 1"))
         return values
 
     def set_swashplate(self, angles: ArrayLike) -> None:

@@ -35,7 +35,8 @@ Array = NDArray[np.float64]
 UNIT = 1e-9  # a quaternion whose norm is this near to one is a unit quaternion
 FREE_METHODS = ("rk4", "tsit5")  # for rotors whose speed is a state
 METHODS = {"etd": ETD, "rk4": RK4, "tsit5": TSIT5, "partitioned": PARTITIONED}
-METHOD = "etd"  # by default
+METHOD, FREE_METHOD = "etd", "tsit5"  # by default, without drives and with them
+AUTO = "auto"  # one of these two
 TICKS = (1e-4, 1.0)  # s, shortest and longest
 AZIMUTH_STEPS = (math.radians(0.01), math.radians(45.0))  # rad
 AZIMUTH_STEP_DEG = 14.4  # by default: docs/speed.md has its errors
@@ -77,7 +78,8 @@ class Simulation:
     method : str
         "etd", of fourth order, which solves what is stiff in the rotors exactly; "rk4", the classical one; "tsit5", of
         fifth order; or "partitioned": the paper's scheme,
-        whose error is of first order in the step. Aircraft with drives fly by "rk4" or "tsit5".
+        whose error is of first order in the step. Aircraft with drives fly by "rk4" or "tsit5". "auto" is "tsit5" for
+        these, and "etd" for others; `options` has which.
     wind : Wind
     ground_altitude : float
         Height of level ground above the origin [m]; touching it ends the flight. -inf is no ground.
@@ -98,7 +100,7 @@ class Simulation:
         azimuth_step: float = AZIMUTH_STEP,
         lead_lag: bool = True,
         cyclic_inflow: bool = True,
-        method: str = METHOD,
+        method: str = AUTO,
         wind: Wind | None = None,
         ground_altitude: float = -math.inf,
     ) -> None:
@@ -107,9 +109,7 @@ class Simulation:
         azimuth_step = checks.number("azimuth_step", azimuth_step, *AZIMUTH_STEPS, "rad", SimulationError)
         lead_lag = checks.flag("lead_lag", lead_lag, SimulationError)
         cyclic_inflow = checks.flag("cyclic_inflow", cyclic_inflow, SimulationError)
-        checks.choice("method", method, tuple(METHODS), SimulationError)
-        if aircraft.drives:
-            checks.choice("method of an aircraft with drives", method, FREE_METHODS, SimulationError)
+        method = chosen_method(aircraft, method)
         ground = checks.number("ground_altitude", ground_altitude, -math.inf, PLAUSIBLE_POSITION, "m", SimulationError)
         self.options: dict[str, Any] = {
             "tick": tick,
@@ -389,6 +389,22 @@ class Simulation:
             wind=air,
             working=working[..., 0],
         )
+
+
+def chosen_method(aircraft: Aircraft, method: str) -> str:
+    """Method of integration, the default of an aircraft for "auto".
+
+    Raises
+    ------
+    SimulationError
+        There is none of this name, or not for rotors whose speed is a state.
+    """
+    checks.choice("method", method, (AUTO, *METHODS), SimulationError)
+    if method == AUTO:
+        return FREE_METHOD if aircraft.drives else METHOD
+    if aircraft.drives:
+        checks.choice("method of an aircraft with drives", method, FREE_METHODS, SimulationError)
+    return method
 
 
 def _single(values: Array) -> Array:

@@ -17,7 +17,7 @@ from sbs_msgs.srv import EngineFailure, Reset, SetWind, Step
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError, SimulationError, TrimError
-from sbs_sim.flight.simulation import AZIMUTH_STEP_DEG, METHOD, METHODS, Simulation
+from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP_DEG, FREE_METHOD, METHOD, METHODS, Simulation
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight_loop import FlightLoop
@@ -57,7 +57,10 @@ PARAMETERS = {
     "publish_rate": Parameter(
         100.0, "Rate of ticks and of the messages on every state topic, in simulation time [Hz]", 1.0, 1e4
     ),
-    "method": Parameter(METHOD, f"Integration method: {', '.join(METHODS)}"),
+    "method": Parameter(
+        AUTO,
+        f"Integration method: {', '.join(METHODS)}; auto is {METHOD}, or {FREE_METHOD} for an aircraft with drives",
+    ),
     "azimuth_step_deg": Parameter(
         AZIMUTH_STEP_DEG, "Largest integration step, as azimuth of the fastest rotor [deg]", 0.01, 45.0
     ),
@@ -136,7 +139,7 @@ class Simulator(Component):
             f"{control.name} {control.shown(value):.3f} {control.shown_unit}"
             for control, value in zip(self.aircraft.controls, point.controls.tolist(), strict=True)
         )
-        self.get_logger().info(f"{self.aircraft.name} trimmed with {controls}")
+        self.get_logger().info(f"{self.aircraft.name} trimmed with {controls}, flies by {simulation.options['method']}")
         return simulation
 
     def _trim(self, airspeed: float, climb_rate: float, sideslip: float, turn_rate: float) -> TrimPoint:

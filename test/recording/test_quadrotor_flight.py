@@ -29,9 +29,10 @@ def test_sticks_act_on_throttles_and_the_log_comes_again(tmp_path):
         assert np.ptp(speeds) > 1.0
         np.testing.assert_allclose(speeds, hover["Omega(1)"], rtol=0.3)
 
-    log = fly(tmp_path, act, aircraft="quadrotor", method="rk4")
+    log = fly(tmp_path, act, aircraft="quadrotor")
     assert_identical(log)
     flight = flight_of(read(log))
+    assert read(log).metadata["simulation"]["method"] == "tsit5"  # the default with drives
     commands = {event.step: event.swashplate for event in flight.events if event.kind == "swashplate"}
     assert len(commands) > 10
     mixed = {aircraft.mix(row).tobytes() for row in controls_of(read(log))}

@@ -41,7 +41,7 @@ _sbs_sim_follows() {
 
 _sbs_sim_parameters() {
     case $1 in
-        'simulator' | 'cockpit') echo 'aircraft:= components:= airspeed:= climb_rate:= sideslip:= turn_rate:= heading:= altitude:= ground_altitude:= real_time_factor:= publish_rate:= method:= azimuth_step_deg:= lead_lag:= cyclic_inflow:= command_timeout:= record:= wind:=' ;;
+        'simulator' | 'cockpit') echo 'aircraft:= components:= airspeed:= climb_rate:= sideslip:= turn_rate:= heading:= altitude:= rotor_speed:= ground_altitude:= real_time_factor:= publish_rate:= method:= azimuth_step_deg:= lead_lag:= cyclic_inflow:= command_timeout:= record:= wind:=' ;;
         'control_mixer' | 'analysis') echo 'aircraft:=' ;;
         'hover_hold') echo 'largest_distance:= patience:= position_limit:=' ;;
         'teleop') echo 'aircraft:= augmentation:= expo:= collective_deg:= cyclic_deg:= differential_deg:=' ;;

@@ -254,6 +254,11 @@ class FlightLoop:
         return self._simulation.step_size
 
     @property
+    def method(self) -> str:
+        """Method of integration."""
+        return str(self._simulation.options["method"])
+
+    @property
     def pace(self) -> float:
         """Wanted real-time factor; 0 is as fast as reports are taken."""
         return self._pace

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks, config_file, validation
 from sbs_sim.aircraft.airfoils import load_tables
+from sbs_sim.aircraft.commands import Row, drive_offset, padded, rows_of
 from sbs_sim.aircraft.consistency import consistency_problems, table_problems
 from sbs_sim.aircraft.declaration import cached_by_class, declarations, frozen, schema_of, values_of
 from sbs_sim.aircraft.description import Array, Description, Range, Rotor
@@ -266,15 +267,30 @@ class Aircraft(Description):
         return data, contents
 
     def mix(self, controls: ArrayLike) -> Array:
-        """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls, shape (n_controls,)."""
-        angles = np.empty((3 * len(self.rotors), 1))
+        """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls, shape (n_controls,).
+
+        Of an aircraft whose controls act on drives too, a row for each such drive follows: throttle, set point of the
+        governor over the speed in the file, and zero; see `rows`. All that is called swashplate has these rows.
+        """
+        angles = np.empty((3 * len(self.rows), 1))
         mixed(self.rigging, np.asarray(controls, dtype=float).reshape(-1, 1), ONE, angles)
         return angles.reshape(-1, 3)
 
     @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """What pilot controls command: the swashplate of each rotor, and each drive that controls act on."""
+        return rows_of(self)
+
+    @cached_property
+    def commanded_drives(self) -> tuple[int, ...]:
+        """Indices of the drives that pilot controls act on."""
+        return tuple(i for i, drive in enumerate(self.drives) if drive.mixing)
+
+    @cached_property
     def mixing(self) -> Array:
-        """Swashplate angles of all rotors over the pilot controls, shape (3 n_rotors, n_controls)."""
-        return frozen(np.concatenate([self._factors(rotor.mixing) for rotor in self.rotors]))
+        """Swashplate angles of all rotors over the pilot controls, shape (3 n_rows, n_controls), see `mix`."""
+        drives = [padded(self._factors(self.drives[i].mixing)) for i in self.commanded_drives]
+        return frozen(np.concatenate([*(self._factors(rotor.mixing) for rotor in self.rotors), *drives]))
 
     def _digest_part(self, digest: Any, part: object) -> None:
         """Add the values of a part of the file that have not their default, those of its own parts included."""
@@ -290,13 +306,14 @@ class Aircraft(Description):
                 self._digest_part(digest, inner)
 
     def _factors(self, mixing: Mapping[str, Mapping[str, float]]) -> Array:
-        """Factors of one rotor, shape (3, n_controls)."""
+        """Factors of one rotor, shape (3, n_controls), or of one drive, shape (2, n_controls)."""
         return np.array([[row.get(name, 0.0) for name in self.control_names] for row in mixing.values()])
 
     @cached_property
     def rigging(self) -> Array:
         """`mixing`, and as its last column the swashplate angles where all controls are zero [rad]."""
-        offsets = np.concatenate([rotor.swashplate_offset for rotor in self.rotors])
+        drives = [drive_offset(self.drives[i]) for i in self.commanded_drives]
+        offsets = np.concatenate([*(rotor.swashplate_offset for rotor in self.rotors), *drives])
         return frozen(np.column_stack([self.mixing, offsets]))
 
     @cached_property
@@ -378,7 +395,7 @@ class Aircraft(Description):
         return controls
 
     def unmix(self, angles: Array) -> Array:
-        """Pilot controls, shape (n_controls,), whose mixture is nearest to swashplate angles [rad], (n_rotors, 3)."""
+        """Pilot controls, shape (n_controls,), whose mixture is nearest to swashplate angles [rad], (n_rows, 3)."""
         change = np.ravel(angles) - self.trim_rigging[:, -1]
         found = np.linalg.lstsq(self.trim_rigging[:, :-1], change, rcond=None)[0]
         return self.with_held(np.asarray(found, dtype=np.float64))

@@ -150,6 +150,10 @@ def _drive_problems(aircraft: "Aircraft", names: list[str]) -> list[str]:
             problems.append(f"drives[{i}].inertia_axis has the length {length:g}: allowed is up to 1")
         if drive.engine != "none" and drive.max_torque == 0:
             problems.append(f"drives[{i}].engine.max_torque = 0: allowed with an engine is > 0")
+        if drive.mixing and drive.engine == "none":
+            problems.append(f"drives[{i}].mixing: not allowed without an engine")
+        if drive.mixing.get("set_point") and not drive.has_governor:
+            problems.append(f"drives[{i}].mixing.set_point: not allowed without a governor")
         if drive.empty_voltage > drive.full_voltage:
             problems.append(
                 f"drives[{i}].battery.empty_voltage = {drive.empty_voltage:g}: allowed is up to"
@@ -203,6 +207,11 @@ def _control_problems(aircraft: "Aircraft") -> list[str]:
         for angle, factors in rotor.mixing.items():
             unknown = [name for name in factors if name not in names]
             where = ", ".join(f"rotors[{i}].mixing.{angle}.{name}" for name in unknown)
+            problems += [f"{where}: unknown key, allowed are {', '.join(names)}"] if unknown else []
+    for i, drive in enumerate(aircraft.drives):
+        for command, factors in drive.mixing.items():
+            unknown = [name for name in factors if name not in names]
+            where = ", ".join(f"drives[{i}].mixing.{command}.{name}" for name in unknown)
             problems += [f"{where}: unknown key, allowed are {', '.join(names)}"] if unknown else []
     return problems
 

@@ -35,6 +35,7 @@ from sbs_sim.aircraft.declaration import (
 )
 from sbs_sim.content import ByContent
 from sbs_sim.model.state import (
+    COMMAND_NAMES,
     CONTROL_AXES,
     CONTROL_NAMES,
     DEFLECTIONS,
@@ -695,6 +696,23 @@ class Rotor(ByContent):
 ENGINES = ("none", "engine", "electric")
 
 
+def _drive_mixing() -> Any:
+    """Field with the commands to a drive over the pilot controls, as `_mixing` has those to a swashplate."""
+    row = named_schema(number_schema(-100, 100))
+    schema = mapping_schema(dict.fromkeys(COMMAND_NAMES, row), [])
+
+    def factors(rows: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+        if not rows:
+            return {}
+        return {name: {key: float(value) for key, value in rows.get(name, {}).items()} for name in COMMAND_NAMES}
+
+    text = (
+        "What pilot controls add to `engine.throttle` and, of a governor, to `set_point`: sum of factor x control, per"
+        " rad or per unit of a control that is no angle; without it no control acts on the drive"
+    )
+    return declared(text, schema, factors, unit="1/rad", default={})
+
+
 @dataclass(frozen=True, eq=False)
 class Drive(ByContent):
     """A drive: rotors that turn together, and what turns them. All torques are at the speed of its first rotor."""
@@ -809,6 +827,7 @@ class Drive(ByContent):
         symbol="k_I",
         default=0,
     )
+    mixing: dict[str, dict[str, float]] = _drive_mixing()
 
     @property
     def has_governor(self) -> bool:

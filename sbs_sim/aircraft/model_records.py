@@ -13,7 +13,7 @@ from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import DEGREE, AirfoilTable, Grid, cell_grid, cells, common_grid
 from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import hub_axes
-from sbs_sim.model.state import ENGINE_TORQUE, GOVERNOR, SPEED, UNSEEN_NAMES, harmonic_count
+from sbs_sim.model.state import ENGINE_TORQUE, GOVERNOR, ROW, SPEED, UNSEEN_NAMES, harmonic_count
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
@@ -278,6 +278,9 @@ def _drives(aircraft: "Aircraft") -> NDArray[Any]:
         for field, name in (("speed", SPEED), ("torque", ENGINE_TORQUE), ("governor", GOVERNOR)):
             drives[i][f"{field}_index"] = places.get(name, -1)
         drives[i]["unseen_index"] = places[UNSEEN_NAMES[0]]
+        commanded = aircraft.commanded_drives
+        row = len(aircraft.rotors) + commanded.index(i) if i in commanded else -1
+        drives[i]["command_index"] = ROW * row if row >= 0 else -1
     return drives
 
 

@@ -268,7 +268,7 @@ def _memory(
     sizes = {
         "state": (len(names),),
         "controls": (max(len(case.aircraft.controls) for case in cases),),
-        "swashplate": (rotors, 3),
+        "swashplate": (max(len(case.aircraft.rows) for case in cases), 3),
         "acceleration": (3,),
         **dict.fromkeys(("thrust", "torque", "power"), (rotors,)),
     }

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.description import TRIMMED_CONTROLS, Rotor
 from sbs_sim.aircraft.model_records import MIN_DENSITY, number_scale, second_moment
+from sbs_sim.analysis.drive_guess import set_drives, stand_in
 from sbs_sim.analysis.trim_problem import TrimProblem
 from sbs_sim.content import ByContent
 from sbs_sim.flight.trim_point import TrimCondition
@@ -267,6 +268,7 @@ class MomentumTheory:
         kept, model = self.aircraft.kept, problem.engine.model
         if MomentumRotor not in kept:
             kept[MomentumRotor] = [MomentumRotor(self.aircraft, model, j) for j in range(len(self.aircraft.rotors))]
+            kept[stand_in] = stand_in(self.aircraft, kept[MomentumRotor]) if self.aircraft.commanded_drives else ()
         self.rotors: list[MomentumRotor] = [copy.copy(rotor) for rotor in kept[MomentumRotor]]  # they meet other air
 
     def guess(self, condition: TrimCondition, share: float = 1.0, controls: Array | None = None) -> Array:
@@ -280,6 +282,7 @@ class MomentumTheory:
             x[layout.flap(j)][:3] = [_clipped(angle, MAX_FLAP) for angle in rotor.flap]
             x[layout.lag(j).start] = _clipped(rotor.lag, MAX_LAG)
             x[layout.inflow(j).start] = rotor.inflow
+        set_drives(self.aircraft, self.aircraft.kept[stand_in], found.rotors, x)
         # rounded, so that no last bit of the libraries' sines and sums is in where a trim begins
         return np.round(self._problem.unknowns(found.pitch, found.roll, found.controls, x), DIGITS)
 
@@ -323,8 +326,10 @@ class MomentumTheory:
         layout, thrusts = self._problem.layout, self._problem.loads[:, R.THRUST].tolist()
         x, swash = self._problem.state(condition, unknowns)
         velocity, _ = condition.motion(unknowns[0], unknowns[1])
-        found = np.empty(len(self.rotors))
-        for j, (theory, rotor) in enumerate(zip(self.rotors, self.aircraft.rotors, strict=True)):
+        found, speeds = np.empty(len(self.rotors)), self.aircraft.rotor_speeds(x).tolist()
+        for j, (kept, rotor) in enumerate(zip(self.rotors, self.aircraft.rotors, strict=True)):
+            theory = copy.copy(kept)
+            theory.speed = speeds[j]
             coning, lag = x[layout.flap(j).start], x[layout.lag(j).start]
             pitch = swash[j, 0] - rotor.pitch_flap_coupling * coning - rotor.pitch_lag_coupling * lag
             theory.meet(velocity)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.commands import row_problems
 from sbs_sim.aircraft.description import Drive
 from sbs_sim.flight.engine import Engine, points_engine
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
@@ -254,19 +255,28 @@ class TrimProblem:
         rows = engine.memory(engine.rotors, WORKING_SIZE)
         working_state(engine.model, engine.work, rows)
         unequal = (f"{rotor.name}: {UNEQUAL_BLADES}" for rotor in self.aircraft.rotors if not rotor.has_equal_blades)
-        return (*warnings(self.aircraft, rows[..., :count].mean(axis=-1)), *unequal, *self._droops(x))
+        return (*warnings(self.aircraft, rows[..., :count].mean(axis=-1)), *unequal, *self._droops(x, swash))
 
-    def _droops(self, x: Array) -> list[str]:
+    def _droops(self, x: Array, swash: Array) -> list[str]:
         """Governors that cannot hold their speed, a line each."""
         found = []
         for i, drive in enumerate(self.aircraft.drives):
             places, speed = self.layout.drive(i), self.aircraft.drive_speed(i)
             if drive.has_governor:
-                missing = drive.set_point - x[places[S.SPEED]] / speed
-                wanted = drive.throttle + x[places[S.GOVERNOR]] + drive.proportional_gain * missing
+                throttle, set_point = self._commands(i, swash)
+                missing = set_point - x[places[S.SPEED]] / speed
+                wanted = throttle + x[places[S.GOVERNOR]] + drive.proportional_gain * missing
                 if abs(missing) > DROOP and not 0.0 <= wanted <= 1.0:
                     found.append(f"drive {i + 1}: throttle at its end, speed {missing:.1%} below its set point")
         return found
+
+    def _commands(self, drive: int, swash: Array) -> tuple[float, float]:
+        """Throttle and set point of a drive: those of the file, or those that pilot controls command."""
+        if drive not in self.aircraft.commanded_drives:
+            own = self.aircraft.drives[drive]
+            return own.throttle, own.set_point
+        row = swash[len(self.aircraft.rotors) + self.aircraft.commanded_drives.index(drive)]
+        return float(row[S.THROTTLE]), float(row[S.SET_POINT])
 
 
 def _drive_unknowns(drive: Drive, speed: float, own: dict[str, float]) -> dict[str, float]:
@@ -316,12 +326,7 @@ def _beyond_limits(aircraft: Aircraft, controls: Array, swash: Array) -> tuple[s
         _outside(control.name, value, control.range, control.unit)
         for control, value in zip(aircraft.controls, controls.tolist(), strict=True)
     ]
-    for rotor, angles in zip(aircraft.rotors, swash, strict=True):
-        ranges = (rotor.collective_range, rotor.cyclic_range, rotor.cyclic_range)
-        found += [
-            _outside(f"{rotor.name} {name}", value, limits, "rad")
-            for name, value, limits in zip(S.SWASHPLATE_NAMES, angles, ranges, strict=True)
-        ]
+    found += [_outside(*problem) for problem in row_problems(aircraft.rows, swash)]
     return tuple(text for text in found if text)
 
 

@@ -109,7 +109,7 @@ def _rotor_rows(craft: "Aircraft", point: "TrimPoint") -> list[list[str]]:
     if craft.drives:
         speeds = craft.rotor_speeds(craft.layout.from_linear(point.state))
         rows.append(["speed [rpm]", *(fixed(speed * 30.0 / math.pi, 2) for speed in speeds)])
-    for name, angles in zip(SWASHPLATE_NAMES, point.swashplate.T, strict=True):
+    for name, angles in zip(SWASHPLATE_NAMES, point.swashplate[: len(craft.rotors)].T, strict=True):
         rows.append([f"{name} [deg]", *(fixed(angle * DEGREES, 4) for angle in angles)])
     families: dict[str, dict[str, list[str]]] = {"flap": {}, "lag": {}, "inflow": {}}
     for name, value in zip(point.state_names, point.state, strict=True):

@@ -26,13 +26,13 @@ class Direct:
     aircraft : Aircraft
     command : callable
         Controls of tick i at a time.
-    initial : ndarray, shape (n_rotors, 3), or None
+    initial : ndarray, shape (n_rows, 3), or None
         Swashplate angles before the flight [rad]; None if unknown.
     """
 
     def __init__(self, aircraft: Aircraft, command: Command, initial: Array | None) -> None:
         self.command, self._aircraft = command, aircraft
-        self._before, self._largest = initial, np.zeros((len(aircraft.rotors), len(S.SWASHPLATE_NAMES)))
+        self._before, self._largest = initial, np.zeros((len(aircraft.rows), S.ROW))
         self._given, self._angles = b"", np.empty(0)
 
     def angles(self, controls: Array, time: float) -> Array:
@@ -48,11 +48,11 @@ class Direct:
 
     def warnings(self, tick: float) -> Iterator[str]:
         """What the actuators would not have done, with ticks of this length [s]."""
-        for rotor, row in zip(self._aircraft.rotors, self._largest, strict=True):
-            for name, step in zip(S.SWASHPLATE_NAMES, row, strict=True):
-                if step > rotor.swashplate_rate * tick + ROUNDING:
-                    rate = f"{math.degrees(rotor.swashplate_rate):g} deg/s"
-                    yield f"{rotor.name}: {name} is moved faster than its actuator moves, {rate}"
+        for row, steps in zip(self._aircraft.rows, self._largest, strict=True):
+            for name, step in zip(row.names, steps, strict=True):
+                if step > row.rate * tick + ROUNDING:
+                    rate = f"{math.degrees(row.rate):g} deg/s"
+                    yield f"{row.owner}: {name} is moved faster than its actuator moves, {rate}"
 
 
 class Mixed:

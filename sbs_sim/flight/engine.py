@@ -137,7 +137,7 @@ class Engine:
         ----------
         point, steps : ndarray, shape (m,)
             Linear state and controls, and half the distance of each pair of evaluations; 0 leaves a column alone.
-        rigging : ndarray, shape (3 n_rotors, n_controls + 1)
+        rigging : ndarray, shape (3 n_rows, n_controls + 1)
             Swashplate angles = rigging @ (controls, 1).
         owners : ndarray of int64, shape (linear_size,)
             See `Layout.linear_owners`.

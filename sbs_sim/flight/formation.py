@@ -102,7 +102,7 @@ class Formation:
 
         Parameters
         ----------
-        swashplates : sequence of ndarray, shape (m, n_rotors, 3) each
+        swashplates : sequence of ndarray, shape (m, n_rows, 3) each
             Angles of each tick of each flight [rad], m = ticks or one more, which is then in force at the end.
         ticks : int
         every : int

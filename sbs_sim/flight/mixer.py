@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.commands import Row
 from sbs_sim.errors import SimulationError
-from sbs_sim.model.state import SWASHPLATE_NAMES
 
 Array = NDArray[np.float64]
 
@@ -42,9 +42,9 @@ class Mixer:
         self.aircraft = aircraft
         ranges = np.array([control.range for control in aircraft.controls])
         self._low, self._high = ranges.T
-        swash = np.array([[r.collective_range, r.cyclic_range, r.cyclic_range] for r in aircraft.rotors])
+        swash = np.array([row.ranges for row in aircraft.rows])
         self._swash_low, self._swash_high = swash[:, :, 0], swash[:, :, 1]
-        self._rates = np.array([[rotor.swashplate_rate] for rotor in aircraft.rotors])
+        self._rates = np.array([[row.rate] for row in aircraft.rows])
         self._target: Array | None = None
         self._rests = True  # at its target since the last `move`
         self._angles: Array | None = None
@@ -69,12 +69,12 @@ class Mixer:
             for control, value, limit in zip(self.aircraft.controls, values.tolist(), clipped.tolist(), strict=True)
             if abs(value - limit) > ROUNDING
         ]
-        for rotor, row, limited in zip(self.aircraft.rotors, wanted, self._target, strict=True):
-            texts += _clipped([f"{rotor.name} {name}" for name in SWASHPLATE_NAMES], row, limited)
+        for row, values_wanted, limited in zip(self.aircraft.rows, wanted, self._target, strict=True):
+            texts += _clipped(row, values_wanted, limited)
         self.saturated = tuple(texts)
 
     def set_position(self, angles: ArrayLike) -> None:
-        """Set the angles at which the swashplates rest now [rad], shape (n_rotors, 3)."""
+        """Set the angles at which the swashplates rest now [rad], shape (n_rows, 3)."""
         self._angles = np.array(angles, dtype=float)
         self._rests = True
 
@@ -90,7 +90,7 @@ class Mixer:
         return self._rests
 
     def move(self, time: float) -> Array:
-        """Swashplate angles [rad], shape (n_rotors, 3), at a time [s].
+        """Swashplate angles [rad], shape (n_rows, 3), at a time [s].
 
         They move towards the target at their actuators' rates. The first target is reached at once
         unless `set_position` has set where the swashplates are.
@@ -116,7 +116,7 @@ class Mixer:
 
     @property
     def position(self) -> Array | None:
-        """Swashplate angles [rad], shape (n_rotors, 3); None if they are not known."""
+        """Swashplate angles [rad], shape (n_rows, 3); None if they are not known."""
         return None if self._angles is None else self._angles.copy()
 
     @property
@@ -154,9 +154,9 @@ def check_ranges(aircraft: Aircraft, values: Array, where: str = "") -> None:
             raise SimulationError(f"{where}{control.name} = {value:.6g}: allowed are {limits}")
 
 
-def _clipped(names: tuple[str, ...] | list[str], wanted: Array, limited: Array) -> list[str]:
+def _clipped(row: Row, wanted: Array, limited: Array) -> list[str]:
     return [
-        f"{name} at its limit of {math.degrees(limit):.6g} deg"
-        for name, value, limit in zip(names, wanted, limited, strict=True)
+        f"{row.owner} {name} at its limit of {row.shown(limit)}"
+        for name, value, limit in zip(row.names, wanted.tolist(), limited.tolist(), strict=True)
         if abs(value - limit) > ROUNDING
     ]

@@ -27,7 +27,7 @@ class Snapshot(ByContent):
         Simulation state, see `sbs_sim.model.state`.
     acceleration : ndarray, shape (3,)
         Inertial acceleration of the c.g. in body axes [m/s^2].
-    swashplate : ndarray, shape (n_rotors, 3)
+    swashplate : ndarray, shape (n_rows, 3)
         Angles in force [rad].
     azimuth : ndarray, shape (n_rotors,)
         [rad], 0 to 2 pi.
@@ -85,7 +85,7 @@ class Event(ByContent):
     kind : str
         "start" (state, swashplate, wind), "swashplate", "reset" (state, swashplate), "wind" or "engine_failure" (drive,
         failure).
-    swashplate : ndarray, shape (n_rotors, 3), or None
+    swashplate : ndarray, shape (n_rows, 3), or None
         [rad]
     state : ndarray, shape (size,), or None
     wind : Wind or None

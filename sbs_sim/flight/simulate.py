@@ -11,7 +11,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.flight.controls import Commands
 from sbs_sim.flight.engine_failure import EngineFailure
 from sbs_sim.flight.history import History
-from sbs_sim.flight.simulation import AZIMUTH_STEP, METHOD
+from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP
 from sbs_sim.flight.sortie import Sortie, fly_together
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.model.wind import Wind
@@ -27,7 +27,7 @@ def simulate(
     azimuth_step: float = AZIMUTH_STEP,
     lead_lag: bool = True,
     cyclic_inflow: bool = True,
-    method: str = METHOD,
+    method: str = AUTO,
     wind: Wind | None = None,
     ground_altitude: float = -math.inf,
     actuators: bool = False,
@@ -60,9 +60,10 @@ def simulate(
     -------
     History
         Mapping of names to arrays, over the n instants between and at the ends of n - 1 ticks: "time" (n,) [s],
-        "controls" (n, n_controls), "swashplate" (n, n_rotors, 3) [rad], "acceleration" (n, 3) [m/s^2], "thrust" [N],
-        "torque" [N m], "power" [W] (n, n_rotors), "state" (n, size) and every name of the simulation state (n,), "phi",
-        "theta", "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed relative to the air [m/s].
+        "controls" (n, n_controls), "swashplate" (n, n_rows, 3) [rad], see `Aircraft.mix`, "acceleration" (n, 3)
+        [m/s^2], "thrust" [N], "torque" [N m], "power" [W] (n, n_rotors), "state" (n, size) and every name of the
+        simulation state (n,), "phi", "theta", "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed
+        relative to the air [m/s].
         `warnings` tells where the model does not hold.
 
     Raises

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.commands import row_problems
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.formation import Flown, Formation
@@ -34,7 +35,8 @@ Array = NDArray[np.float64]
 UNIT = 1e-9  # a quaternion whose norm is this near to one is a unit quaternion
 FREE_METHODS = ("rk4", "tsit5")  # for rotors whose speed is a state
 METHODS = {"etd": ETD, "rk4": RK4, "tsit5": TSIT5, "partitioned": PARTITIONED}
-METHOD = "etd"  # by default
+METHOD, FREE_METHOD = "etd", "tsit5"  # by default, without drives and with them
+AUTO = "auto"  # one of these two
 TICKS = (1e-4, 1.0)  # s, shortest and longest
 AZIMUTH_STEPS = (math.radians(0.01), math.radians(45.0))  # rad
 AZIMUTH_STEP_DEG = 14.4  # by default: docs/speed.md has its errors
@@ -64,8 +66,8 @@ class Simulation:
     aircraft : Aircraft
     state : ndarray, shape (size,)
         Simulation state at the start.
-    swashplate : ndarray, shape (n_rotors, 3)
-        Angles until others are set [rad].
+    swashplate : ndarray, shape (n_rows, 3)
+        Angles until others are set [rad], see `Aircraft.mix`.
     tick : float
         Length of a tick [s], 1e-4 to 1.
     azimuth_step : float
@@ -76,7 +78,8 @@ class Simulation:
     method : str
         "etd", of fourth order, which solves what is stiff in the rotors exactly; "rk4", the classical one; "tsit5", of
         fifth order; or "partitioned": the paper's scheme,
-        whose error is of first order in the step. Aircraft with drives fly by "rk4" or "tsit5".
+        whose error is of first order in the step. Aircraft with drives fly by "rk4" or "tsit5". "auto" is "tsit5" for
+        these, and "etd" for others; `options` has which.
     wind : Wind
     ground_altitude : float
         Height of level ground above the origin [m]; touching it ends the flight. -inf is no ground.
@@ -97,7 +100,7 @@ class Simulation:
         azimuth_step: float = AZIMUTH_STEP,
         lead_lag: bool = True,
         cyclic_inflow: bool = True,
-        method: str = METHOD,
+        method: str = AUTO,
         wind: Wind | None = None,
         ground_altitude: float = -math.inf,
     ) -> None:
@@ -106,9 +109,7 @@ class Simulation:
         azimuth_step = checks.number("azimuth_step", azimuth_step, *AZIMUTH_STEPS, "rad", SimulationError)
         lead_lag = checks.flag("lead_lag", lead_lag, SimulationError)
         cyclic_inflow = checks.flag("cyclic_inflow", cyclic_inflow, SimulationError)
-        checks.choice("method", method, tuple(METHODS), SimulationError)
-        if aircraft.drives:
-            checks.choice("method of an aircraft with drives", method, FREE_METHODS, SimulationError)
+        method = chosen_method(aircraft, method)
         ground = checks.number("ground_altitude", ground_altitude, -math.inf, PLAUSIBLE_POSITION, "m", SimulationError)
         self.options: dict[str, Any] = {
             "tick": tick,
@@ -233,7 +234,9 @@ class Simulation:
         return values
 
     def checked_swashplate(self, angles: ArrayLike) -> Array:
-        """Copy of the swashplate angles of all rotors [rad], shape (n_rotors, 3), if each is within its range.
+        """Copy of the swashplate angles of all rotors [rad], shape (n_rows, 3), if each is within its range.
+
+        The rows are those of `Aircraft.mix`.
 
         Raises
         ------
@@ -241,17 +244,15 @@ class Simulation:
             Naming rotor, angle, value and range.
         """
         values = checks.array("swashplate", angles, SimulationError)
-        rotors = self.aircraft.rotors
-        if values.shape != (len(rotors), 3):
+        rows = self.aircraft.rows
+        if values.shape != (len(rows), 3):
             if values.ndim == 2 and values.shape[1] == 3:
-                allowed = f"{len(rotors)}, those of the aircraft"
-                raise SimulationError(f"swashplate has {len(values)} rotors: allowed are {allowed}")
-            raise SimulationError(f"swashplate has shape {values.shape}: allowed is {(len(rotors), 3)}")
-        for rotor, row in zip(rotors, values, strict=True):
-            ranges = (rotor.collective_range, rotor.cyclic_range, rotor.cyclic_range)
-            for name, value, (low, high) in zip(S.SWASHPLATE_NAMES, row, ranges, strict=True):
-                if not low - 1e-12 <= value <= high + 1e-12:
-                    raise SimulationError(f"{rotor.name} {name} = {value}: allowed are {low:.6g} to {high:.6g} rad")
+                drives = " and drives that controls act on" if self.aircraft.commanded_drives else ""
+                allowed = f"{len(rows)}, those of the aircraft{drives}"
+                raise SimulationError(f"swashplate has {len(values)} rotors{drives}: allowed are {allowed}")
+            raise SimulationError(f"swashplate has shape {values.shape}: allowed is {(len(rows), 3)}")
+        for name, value, (low, high), unit in row_problems(rows, values):
+            raise SimulationError(f"{name} = {value}: allowed are {low:.6g} to {high:.6g} {unit}".removesuffix(" 1"))
         return values
 
     def set_swashplate(self, angles: ArrayLike) -> None:
@@ -388,6 +389,22 @@ class Simulation:
             wind=air,
             working=working[..., 0],
         )
+
+
+def chosen_method(aircraft: Aircraft, method: str) -> str:
+    """Method of integration, the default of an aircraft for "auto".
+
+    Raises
+    ------
+    SimulationError
+        There is none of this name, or not for rotors whose speed is a state.
+    """
+    checks.choice("method", method, (AUTO, *METHODS), SimulationError)
+    if method == AUTO:
+        return FREE_METHOD if aircraft.drives else METHOD
+    if aircraft.drives:
+        checks.choice("method of an aircraft with drives", method, FREE_METHODS, SimulationError)
+    return method
 
 
 def _single(values: Array) -> Array:

@@ -136,8 +136,8 @@ class TrimPoint(ByContent):
         N_c of the averages.
     controls : ndarray, shape (n_controls,)
         Collective, lateral, longitudinal, differential longitudinal cyclic [rad].
-    swashplate : ndarray, shape (n_rotors, 3)
-        Angles of each rotor [rad].
+    swashplate : ndarray, shape (n_rows, 3)
+        Angles of each rotor [rad], see `Aircraft.mix`.
     pitch, roll : float
         [rad]
     state : ndarray, shape (n,)

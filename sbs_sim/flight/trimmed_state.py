@@ -9,12 +9,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.model_records import drive_of
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.trim_point import StandPoint, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
 
 Array = NDArray[np.float64]
+
+MAX_SPEED = 1.5  # of rotors at the start, over that of the trim
 
 
 def trimmed_state(
@@ -23,6 +26,7 @@ def trimmed_state(
     position: ArrayLike = (0.0, 0.0, 0.0),
     heading: float = 0.0,
     wind: ArrayLike = (0.0, 0.0, 0.0),
+    rotor_speed: float = 1.0,
 ) -> Array:
     """Simulation state of a trim point.
 
@@ -37,6 +41,8 @@ def trimmed_state(
         On a stand both are those of the rest, and must not be given.
     wind : array_like, shape (3,)
         Steady wind, NED [m/s]; the aircraft is trimmed relative to the air and drifts with it.
+    rotor_speed : float
+        Speed of rotors that have a drive over that of the trim, 0 to 1.5; see `slowed`.
 
     Returns
     -------
@@ -46,7 +52,8 @@ def trimmed_state(
     ------
     SimulationError
         A trim of an aircraft with other rotors; one that is no rest of a stand for an aircraft on a stand; a heading
-        that is not finite or far from a turn. Position and velocity are checked by `Simulation`.
+        that is not finite or far from a turn; another rotor speed than 1 without drives. Position and velocity are
+        checked by `Simulation`.
     """
     if aircraft.body.is_stand and not isinstance(point, StandPoint):
         raise SimulationError("body.stand: allowed on a stand is a start from a trim on it, or give a state")
@@ -66,4 +73,53 @@ def trimmed_state(
     north, east, down = np.asarray(wind, dtype=float).tolist()
     to_earth = rotation_matrix(euler_to_quaternion(heading, point.pitch, point.roll))
     state[S.VELOCITY : S.RATES] += to_earth[0] * north + to_earth[1] * east + to_earth[2] * down
-    return state
+    return slowed(aircraft, state, rotor_speed)
+
+
+def standing_state(
+    aircraft: Aircraft, position: ArrayLike = (0.0, 0.0, 0.0), heading: float = 0.0, rotor_speed: float = 1.0
+) -> Array:
+    """Simulation state of an aircraft on a stand that does not move: blades straight, without inflow.
+
+    Rotors that have a drive turn at the speed of the file times `rotor_speed`, their engines give no torque.
+
+    Raises
+    ------
+    SimulationError
+        See `trimmed_state`.
+    """
+    heading = checks.number("heading", heading, -4 * math.pi, 4 * math.pi, "rad", SimulationError)
+    state = np.zeros(aircraft.layout.size)
+    state[: S.ATTITUDE] = position
+    state[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(heading, 0.0, 0.0)
+    for i in range(len(aircraft.drives)):
+        state[aircraft.layout.drive(i)[S.SPEED]] = aircraft.drive_speed(i)
+    return slowed(aircraft, state, rotor_speed)
+
+
+def slowed(aircraft: Aircraft, state: Array, rotor_speed: float) -> Array:
+    """Simulation state whose rotors on drives turn at a share of their speed; 0 is at rest.
+
+    Flap, lag and inflow of these rotors, torque and governor are the same share of what they were: rotors at rest have
+    straight blades, no inflow, and an engine that gives no torque yet. 1 gives back every bit.
+
+    Raises
+    ------
+    SimulationError
+        A share out of range, or another one than 1 of an aircraft without drives.
+    """
+    share = checks.number("rotor_speed", rotor_speed, 0.0, MAX_SPEED, "", SimulationError)
+    if share == 1.0:
+        return state
+    if not aircraft.drives:
+        raise SimulationError(
+            f"rotor_speed = {share:g}: allowed is 1 for rotors without drives, whose speed is constant"
+        )
+    changed, layout = state.copy(), aircraft.layout
+    for j, rotor in enumerate(aircraft.rotors):
+        if drive_of(aircraft, rotor) >= 0:
+            for part in (layout.flap(j), layout.flap_rate(j), layout.lag(j), layout.lag_rate(j), layout.inflow(j)):
+                changed[part] *= share
+    for i, drive in enumerate(aircraft.drives):
+        changed[[layout.drive(i)[name] for name in drive.state_names]] *= share
+    return changed

@@ -30,7 +30,7 @@ def trim_residuals(derivative, model, unknowns, motion, rotor_indices, equations
         Indices in the rate of the simulation state.
     scales : ndarray, shape (n_equations,)
         What each is divided by.
-    rigging : ndarray, shape (3 n_rotors, n_controls + 1)
+    rigging : ndarray, shape (3 n_rows, n_controls + 1)
     psi : ndarray, shape (count, n_rotors)
         Azimuths [rad].
     inputs : ndarray, shape (n_unknowns, n)

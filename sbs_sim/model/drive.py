@@ -72,7 +72,9 @@ def driven_derivative(model, x, swash, psi, wind, work, dx, with_loads):
 
     Parameters
     ----------
-    model, x, swash, wind, work, dx, with_loads : see `sbs_sim.model.dynamics.derivative`
+    model, x, wind, work, dx, with_loads : see `sbs_sim.model.dynamics.derivative`
+    swash : ndarray, shape (3 n_rows, n)
+        Swashplate angles [rad], and commands to drives, see `sbs_sim.Aircraft.mix`.
     psi : ndarray, shape (n_rotors, n)
         Azimuths of the rotors [rad]; of those with a drive where that of the drive is zero.
     """
@@ -88,7 +90,7 @@ def driven_derivative(model, x, swash, psi, wind, work, dx, with_loads):
     loads = set_known_loads(aircraft, memory, flight, as_lanes(swash, like), turning[AZIMUTHS])
     loads = transmission_loads(memory.state, drives, flight, loads)
     for i in range(drives.shape[0]):
-        set_drive_rates(memory.state, drives[i], shafts[i], out)
+        set_drive_rates(memory.state, drives[i], shafts[i], as_lanes(swash, like), out)
         eliminate(aircraft, memory, drives, i, shafts[i])
     solve_coupled_body(aircraft, memory, flight, loads)
     solve_blades(aircraft, memory)
@@ -131,8 +133,11 @@ def transmission_loads(x, drives, flight, loads):
 
 
 @kernel
-def set_drive_rates(x, drive, shaft, dx):
-    """Set the torque on the shaft of a drive, and the rates of its states but for its speed."""
+def set_drive_rates(x, drive, shaft, commands, dx):
+    """Set the torque on the shaft of a drive, and the rates of its states but for its speed.
+
+    `commands` are the swashplate angles, and behind them throttle and set point of drives that pilot controls act on.
+    """
     speed, unseen = x[drive.speed_index] + 0.0, drive.unseen_index
     dx[unseen + S.AZIMUTH] = speed
     dx[unseen + S.DISCHARGE], dx[unseen + S.FAILURE] = 0.0 * speed, 0.0 * speed
@@ -140,11 +145,17 @@ def set_drive_rates(x, drive, shaft, dx):
     if drive.engine == NONE:
         return
     torque = x[drive.torque_index] + 0.0
-    missing = (drive.set_point - speed) / drive.speed
-    integral, throttle = 0.0 * speed, drive.throttle + 0.0 * speed
+    set_point, given_throttle = drive.set_point + 0.0 * speed, drive.throttle + 0.0 * speed
+    if drive.command_index >= 0:
+        set_point = rounded(drive.speed * commands[drive.command_index + 1])
+        given_throttle = commands[drive.command_index] + 0.0
+    missing = (set_point - speed) / drive.speed
+    integral, throttle = 0.0 * speed, given_throttle
+    if drive.command_index >= 0:
+        throttle = minimum(maximum(throttle, 0.0), 1.0)
     if drive.governor_index >= 0:
         integral = x[drive.governor_index] + 0.0
-        wanted = drive.throttle + integral + drive.proportional_gain * missing
+        wanted = given_throttle + integral + drive.proportional_gain * missing
         throttle = minimum(maximum(wanted, 0.0), 1.0)
         # at an end of the throttle the integral does not grow on
         winds_up = ((wanted > 1.0) & (missing > 0.0)) | ((wanted < 0.0) & (missing < 0.0))

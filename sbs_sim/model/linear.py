@@ -22,7 +22,7 @@ def jacobian(derivative, model, point, rigging, steps, owners, psi, work, tick, 
     derivative, model, work, tick : see `sbs_sim.model.integrate.advance`; the lanes are states of one aircraft
     point : ndarray, shape (m,)
         Linear state and pilot controls.
-    rigging : ndarray, shape (3 n_rotors, n_controls + 1)
+    rigging : ndarray, shape (3 n_rows, n_controls + 1)
         Swashplate angles = rigging @ (controls, 1).
     steps : ndarray, shape (m,)
         Half the distance of each pair of evaluations; 0 leaves a column alone.

@@ -17,9 +17,10 @@ def mix(rigging, controls, first, swash):
 
 @entry
 def mixed(rigging, controls, like, swash):
-    """Swashplate angles, shape (3 n_rotors, n), of pilot controls, (n_controls, n); `like` are records of n lanes.
+    """Swashplate angles, shape (3 n_rows, n), of pilot controls, (n_controls, n); `like` are records of n lanes.
 
-    The rigging has the shape (3 n_rotors, n_controls + 1): the angles are rigging @ (controls, 1).
+    The rigging has the shape (3 n_rows, n_controls + 1): the angles are rigging @ (controls, 1). `sbs_sim.Aircraft.mix`
+    has the rows.
     """
     records = as_records(like)
     mix(rigging, as_lanes(controls, records), 0, as_lanes(swash, records))

@@ -142,6 +142,7 @@ DRIVE = {
     "torque_index": INTEGER,
     "governor_index": INTEGER,
     "unseen_index": INTEGER,
+    "command_index": INTEGER,  # of throttle and set point behind the swashplate angles; -1 where no control acts
 }
 # a drive at work: column of its speed in the mass matrix, inertia, torques, acceleration
 SHAFT = {"force": VECTOR, "moment": VECTOR, "inverse_inertia": LANES, "torque": LANES, "acceleration": LANES}

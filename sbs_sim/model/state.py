@@ -50,6 +50,9 @@ SPEED, ENGINE_TORQUE, GOVERNOR = DRIVE_NAMES = ("Omega", "engine_torque", "gover
 DRIVE_UNITS = {SPEED: "rad/s", ENGINE_TORQUE: "N m", GOVERNOR: "1"}
 UNSEEN_NAMES = ("azimuth", "discharge", "engine_failure")  # of a drive, and not in the linear state
 AZIMUTH, DISCHARGE, FAILURE = range(3)  # of UNSEEN_NAMES
+COMMAND_NAMES = ("throttle", "set_point")  # of a drive that pilot controls act on
+THROTTLE, SET_POINT = range(2)  # of COMMAND_NAMES
+ROW = len(SWASHPLATE_NAMES)  # numbers in a row of commands: a swashplate's, or a drive's and what is left at zero
 
 _ROTOR_STATE = re.compile(
     r"(?P<rate>d?)(?:[ab](?P<flap>\d+|d)|xi(?P<lag>0|d|\d*[cs]))\((?P<rotor>\d+)\)"

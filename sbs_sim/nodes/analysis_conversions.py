@@ -17,7 +17,13 @@ from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.records import Snapshot
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.average import azimuths
-from sbs_sim.nodes.conversions import StateMessages, axis_controls_message, float64_array, swashplate_messages
+from sbs_sim.nodes.conversions import (
+    StateMessages,
+    axis_controls_message,
+    command_messages,
+    float64_array,
+    swashplate_messages,
+)
 
 Array = NDArray[np.float64]
 
@@ -31,7 +37,8 @@ def trim_message(aircraft: Aircraft, point: trim.TrimPoint) -> TrimPoint:
         controls=axis_controls_message(aircraft, point.controls),
         roll=point.roll,
         pitch=point.pitch,
-        swashplate=swashplate_messages(point.swashplate),
+        swashplate=swashplate_messages(point.swashplate[: len(aircraft.rotors)]),
+        drives=command_messages(point.swashplate[len(aircraft.rotors) :]),
         rotors=rotors.rotors.rotors,
         inflow=rotors.inflow.rotors,
         state_names=point.state_names,

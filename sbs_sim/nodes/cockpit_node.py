@@ -132,7 +132,7 @@ class Cockpit(Component):
         except SbsError as error:
             self.get_logger().warning(f"not drawn: {error}", throttle_duration_sec=WARNING_PERIOD)
             return None
-        if len(swashplate) != len(aircraft.rotors):
+        if len(swashplate) != len(aircraft.rows):
             return None
         playing, age = status.state == SimulationStatus.PLAYING, time.monotonic() - self._arrived
         if gone := age > MESSAGE_TIMEOUT:

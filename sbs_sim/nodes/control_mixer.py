@@ -26,7 +26,14 @@ from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.state import SWASHPLATE_NAMES
 from sbs_sim.nodes.command_monitor import CommandMonitor
 from sbs_sim.nodes.component import Component
-from sbs_sim.nodes.conversions import FRAME_BODY, controls_array, swashplate_messages, to_seconds, to_time
+from sbs_sim.nodes.conversions import (
+    FRAME_BODY,
+    command_messages,
+    controls_array,
+    swashplate_messages,
+    to_seconds,
+    to_time,
+)
 from sbs_sim.nodes.diagnostics import DIAGNOSTICS_PERIOD, diagnostic_status
 from sbs_sim.nodes.parameters import Parameter, declare
 from sbs_sim.nodes.process import run
@@ -105,7 +112,7 @@ class ControlMixer(Component):
             self._by_name.restart()
             angles = np.array(message.swashplate).reshape(-1, len(SWASHPLATE_NAMES))
             self._forget()
-            if len(angles) == len(self._mixer.aircraft.rotors):  # else it is another aircraft's
+            if len(angles) == len(self._mixer.aircraft.rows):  # else it is another aircraft's
                 self._mixer.set_position(angles)
 
     def _on_controls(self, message: Controls) -> None:
@@ -167,7 +174,8 @@ class ControlMixer(Component):
         message = SwashplateArray()
         message.header.stamp = to_time(now)
         message.header.frame_id = FRAME_BODY
-        message.rotors = swashplate_messages(angles)
+        message.rotors = swashplate_messages(angles[: len(self._mixer.aircraft.rotors)])
+        message.drives = command_messages(angles[len(self._mixer.aircraft.rotors) :])
         self._output.publish(message)
         if self._mixer.arrived:
             self._ramp.cancel()

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sbs_msgs.msg import (
     BodyState,
     Controls,
+    DriveCommand,
     DriveState,
     FlightEvent,
     Inflow,
@@ -84,14 +85,20 @@ def controls_array(message: Controls) -> Array:
 
 
 def swashplate_array(message: SwashplateArray) -> Array:
-    """Swashplate angles [rad], shape (n_rotors, 3)."""
+    """Swashplate angles [rad], shape (n_rows, 3), see `Aircraft.mix`."""
     angles = [[getattr(rotor, name) for name in S.SWASHPLATE_NAMES] for rotor in message.rotors]
-    return np.array(angles, dtype=float).reshape(-1, len(S.SWASHPLATE_NAMES))
+    angles += [[*(getattr(drive, name) for name in S.COMMAND_NAMES), 0.0] for drive in message.drives]
+    return np.array(angles, dtype=float).reshape(-1, S.ROW)
 
 
 def swashplate_messages(angles: Array) -> list[Swashplate]:
     """One message per rotor of swashplate angles [rad], shape (n_rotors, 3)."""
     return [Swashplate(**dict(zip(S.SWASHPLATE_NAMES, row, strict=True))) for row in angles.tolist()]
+
+
+def command_messages(rows: Array) -> list[DriveCommand]:
+    """One message per drive of the rows behind those of the rotors, shape (n, 3)."""
+    return [DriveCommand(**dict(zip(S.COMMAND_NAMES, row, strict=False))) for row in rows.tolist()]
 
 
 def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
@@ -344,7 +351,7 @@ def snapshot_of(
     body : BodyState
     rotors : RotorStateArray
     inflow : InflowArray
-    swashplate : ndarray, shape (n_rotors, 3)
+    swashplate : ndarray, shape (n_rows, 3)
         [rad]
     wind : ndarray, shape (3,)
         Velocity of the air, NED [m/s].

@@ -7,8 +7,10 @@ recorder in the same process.
 
 import math
 import sys
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from std_srvs.srv import SetBool
 
@@ -17,9 +19,9 @@ from sbs_msgs.srv import EngineFailure, Reset, SetWind, Step
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError, SimulationError, TrimError
-from sbs_sim.flight.simulation import AZIMUTH_STEP_DEG, METHOD, METHODS, Simulation
+from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP_DEG, FREE_METHOD, METHOD, METHODS, Simulation
 from sbs_sim.flight.trim_point import TrimPoint
-from sbs_sim.flight.trimmed_state import trimmed_state
+from sbs_sim.flight.trimmed_state import MAX_SPEED, standing_state, trimmed_state
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.command_monitor import CommandMonitor
@@ -36,6 +38,7 @@ from sbs_sim.nodes.simulator_outputs import SimulatorOutputs
 OFF = "off"
 # How long a thread keeps the interpreter while the flight waits for it [s]; the 5 ms of Python are half a tick.
 SWITCH_INTERVAL = 0.5e-3
+CONDITION = ("airspeed", "climb_rate", "sideslip", "turn_rate")
 COMPONENTS = ("simulator", "control_mixer", "analysis", "recorder")
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
@@ -48,6 +51,12 @@ PARAMETERS = {
     "turn_rate": Parameter(0.0, "At the start: rate of the heading, right positive [rad/s]", -3.0, 3.0),
     "heading": Parameter(0.0, "At the start: heading, from north to east [rad]", -math.pi, math.pi),
     "altitude": Parameter(0.0, "At the start: height above the origin [m]", -1e5, 1e5),
+    "rotor_speed": Parameter(
+        1.0,
+        "At the start: speed of the rotors that have a drive over that of the trim; 0 is at rest, for a run-up",
+        0.0,
+        MAX_SPEED,
+    ),
     "ground_altitude": Parameter(
         -100.0, "Height of the level ground above the origin [m]; contact stops the flight until a reset", -1e5, 1e5
     ),
@@ -57,7 +66,10 @@ PARAMETERS = {
     "publish_rate": Parameter(
         100.0, "Rate of ticks and of the messages on every state topic, in simulation time [Hz]", 1.0, 1e4
     ),
-    "method": Parameter(METHOD, f"Integration method: {', '.join(METHODS)}"),
+    "method": Parameter(
+        AUTO,
+        f"Integration method: {', '.join(METHODS)}; auto is {METHOD}, or {FREE_METHOD} for an aircraft with drives",
+    ),
     "azimuth_step_deg": Parameter(
         AZIMUTH_STEP_DEG, "Largest integration step, as azimuth of the fastest rotor [deg]", 0.01, 45.0
     ),
@@ -115,16 +127,17 @@ class Simulator(Component):
         self.loop.start()
 
     def _start(self, values: dict[str, Any]) -> Simulation:
-        """Simulation in trimmed flight at the condition that the parameters name."""
+        """Simulation in trimmed flight at the condition that the parameters name, or of rotors on a stand."""
         if len(values["wind"]) != 3:
             raise SbsError(f"parameter wind = {list(values['wind'])}: allowed are 3 numbers, north, east, down [m/s]")
         wind = Wind(velocity=tuple(values["wind"]))
-        point = self._trim(*(values[name] for name in ("airspeed", "climb_rate", "sideslip", "turn_rate")))
-        position = (0.0, 0.0, -values["altitude"])
+        condition = [values[name] for name in CONDITION]
+        position, start = (0.0, 0.0, -values["altitude"]), (values["heading"], wind.velocity, values["rotor_speed"])
+        state, controls = self._beginning(condition, position, *start)
         simulation = Simulation(
             self.aircraft,
-            trimmed_state(self.aircraft, point, position, values["heading"], wind.velocity),
-            point.swashplate,
+            state,
+            self.aircraft.mix(controls),
             tick=1.0 / values["publish_rate"],
             method=values["method"],
             azimuth_step=math.radians(values["azimuth_step_deg"]),
@@ -132,12 +145,27 @@ class Simulator(Component):
             ground_altitude=values["ground_altitude"],
             **self._fidelity,
         )
-        controls = ", ".join(
+        shown = ", ".join(
             f"{control.name} {control.shown(value):.3f} {control.shown_unit}"
-            for control, value in zip(self.aircraft.controls, point.controls.tolist(), strict=True)
+            for control, value in zip(self.aircraft.controls, controls.tolist(), strict=True)
         )
-        self.get_logger().info(f"{self.aircraft.name} trimmed with {controls}")
+        begins = "on its stand" if self.aircraft.body.is_stand else "trimmed"
+        self.get_logger().info(f"{self.aircraft.name} {begins} with {shown}, flies by {simulation.options['method']}")
         return simulation
+
+    def _beginning(
+        self, condition: Sequence[float], position: Any, heading: float, wind: Any, rotor_speed: float
+    ) -> tuple[Any, Any]:
+        """State and pilot controls with which a flight begins: trimmed, or with controls at their rest on a stand."""
+        if not self.aircraft.body.is_stand:
+            point = self._trim(*condition)
+            return trimmed_state(self.aircraft, point, position, heading, wind, rotor_speed), point.controls
+        for name, value in zip(CONDITION, condition, strict=True):
+            if value != 0.0:
+                raise SimulationError(f"{name} = {value:g}: allowed is 0 for an aircraft on a stand")
+        low, high = np.array([control.range for control in self.aircraft.controls]).T
+        controls = np.clip(self.aircraft.held_controls, low, high)
+        return standing_state(self.aircraft, position, heading, rotor_speed), controls
 
     def _trim(self, airspeed: float, climb_rate: float, sideslip: float, turn_rate: float) -> TrimPoint:
         """Trim that can be flown: every control within its limits."""
@@ -173,11 +201,10 @@ class Simulator(Component):
             if request.from_state:
                 self.loop.reset(request.state, self.loop.swashplate())
                 return
-            point = self._trim(request.airspeed, request.climb_rate, request.sideslip, request.turn_rate)
-            wind = self.loop.wind().velocity
-            position = point_array(request.position)
-            state = trimmed_state(self.aircraft, point, position, request.heading, wind)
-            self.loop.reset(state, point.swashplate)
+            wind, position = self.loop.wind().velocity, point_array(request.position)
+            condition = [getattr(request, name) for name in CONDITION]
+            state, controls = self._beginning(condition, position, request.heading, wind, request.rotor_speed)
+            self.loop.reset(state, self.aircraft.mix(controls))
 
         return self.answer(response, reset, "reset", request)
 
@@ -228,10 +255,11 @@ def check_reset(request: Reset.Request) -> None:
             raise SimulationError(f"state: {len(request.state)} values, allowed with from_state = true only")
         return
     position = point_array(request.position)
-    unused = {name: getattr(request, name) for name in ("airspeed", "climb_rate", "sideslip", "turn_rate", "heading")}
+    unused = {name: getattr(request, name) for name in (*CONDITION, "heading")}
     unused |= {f"position.{axis}": float(value) for axis, value in zip("xyz", position, strict=True)}
-    for name, value in unused.items():
-        if value != 0.0:
+    usual = {"rotor_speed": 1.0}
+    for name, value in (unused | {"rotor_speed": request.rotor_speed}).items():
+        if value != usual.get(name, 0.0):
             raise SimulationError(f"{name} = {value:g}: not allowed with from_state = true, the state has its own")
 
 

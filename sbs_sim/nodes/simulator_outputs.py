@@ -214,6 +214,7 @@ class SimulatorOutputs:
             "sim_time": f"{report.time:.3f}",
             "real_time_factor": f"{report.real_time_factor:.4f}",
             "missed_deadlines": report.missed_deadlines,
+            "method": self._loop.method,
             **self._commands.values(),
         }
         message = DiagnosticArray(status=[diagnostic_status("simulator", problems, values)])

@@ -73,9 +73,9 @@ class StickNode(PilotNode):
     def on_event(self, event: FlightEvent, is_new: bool) -> None:
         """Update the present controls; after a reset they belong to another flight."""
         angles = np.array(event.swashplate)
-        rotors = len(angles) // len(S.SWASHPLATE_NAMES)
-        self._other_rotors = rotors if rotors != len(self._aircraft.rotors) else 0
-        if len(angles) != len(S.SWASHPLATE_NAMES) * len(self._aircraft.rotors):
+        rows = len(angles) // S.ROW
+        self._other_rotors = rows if rows != len(self._aircraft.rows) else 0
+        if len(angles) != S.ROW * len(self._aircraft.rows):
             return
         if self._current_controls is None:
             self._first_event = time.monotonic()
@@ -93,7 +93,7 @@ class StickNode(PilotNode):
     def waiting_for(self) -> str:
         """What is missing before the controls can be taken over."""
         if self._first is None and self._other_rotors:
-            own = f"{self._aircraft.name} has {len(self._aircraft.rotors)}"
+            own = f"{self._aircraft.name} has {len(self._aircraft.rows)}"
             return f"another flight: the aircraft of this one has {self._other_rotors} rotors, {own}; see aircraft:="
         what = super().waiting_for()
         if not what and self._first is None and self._current_controls is None:

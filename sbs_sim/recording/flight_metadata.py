@@ -26,5 +26,7 @@ def attachments(aircraft: Aircraft) -> dict[str, bytes]:
     """The aircraft as files: its own and those of its airfoils."""
     data, files = aircraft.files()
     text = io.BytesIO()
-    YAML(typ="safe", pure=True).dump(data, text)
+    writer = YAML(typ="safe", pure=True)
+    writer.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # pilot controls have an order
+    writer.dump(data, text)
     return {AIRCRAFT_FILE: text.getvalue(), **{f"{AIRFOIL_FOLDER}/{name}": content for name, content in files.items()}}

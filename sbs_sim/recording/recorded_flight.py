@@ -160,7 +160,7 @@ def _events(log: Log, aircraft: Aircraft) -> tuple[Event, ...]:
             Event(
                 int(topic["step"][i]),
                 str(kind),
-                swashplate.reshape(len(aircraft.rotors), -1) if swashplate.size else None,
+                swashplate.reshape(len(aircraft.rows), -1) if swashplate.size else None,
                 state if state.size else None,
                 _wind(topic, i) if kind in ("start", "wind") else None,
                 **{name: int(topic[name][i]) for name in EVENT_COUNTS if name in topic},

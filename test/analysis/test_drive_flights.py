@@ -159,6 +159,22 @@ def test_events_are_those_of_the_simulation_bit_for_bit(governed):
     assert speed[0] > speed[29] > speed[-1]
 
 
+def test_the_default_method_is_one_that_can_fly_it(governed):
+    """tsit5 with drives, etd without; the options, which logs have, say which."""
+    aircraft, point = governed
+    default = simulate(aircraft, point, point.controls, 0.05)
+    np.testing.assert_array_equal(
+        default["state"], simulate(aircraft, point, point.controls, 0.05, method="tsit5")["state"]
+    )
+    start = trimmed_state(aircraft, point)
+    assert Simulation(aircraft, start, point.swashplate).options["method"] == "tsit5"
+    kept = constant()
+    hover = trim(kept)
+    assert Simulation(kept, trimmed_state(kept, hover), hover.swashplate).options["method"] == "etd"
+    with pytest.raises(SimulationError, match="method = 'euler': allowed are auto, etd"):
+        simulate(aircraft, point, point.controls, 0.1, method="euler")
+
+
 def test_azimuths_are_those_of_the_drive(governed):
     """At a governed speed they grow as those of rotors of constant speed do."""
     aircraft, point = governed
@@ -173,8 +189,11 @@ def test_azimuths_are_those_of_the_drive(governed):
 def test_what_is_not_possible_is_refused(governed):
     """With one clear line."""
     aircraft, point = governed
-    with pytest.raises(SimulationError, match="method of an aircraft with drives = 'etd': allowed are rk4, tsit5"):
-        simulate(aircraft, point, point.controls, 0.1)
+    for method in ("etd", "partitioned"):
+        with pytest.raises(
+            SimulationError, match=f"method of an aircraft with drives = '{method}': allowed are rk4, tsit5"
+        ):
+            simulate(aircraft, point, point.controls, 0.1, method=method)
     with pytest.raises(TrimError, match="two_loop"):
         trim(aircraft, method="two_loop")
     with pytest.raises(LinearizationError, match="paper"):

@@ -177,7 +177,7 @@ def test_a_flight_goes_on_from_its_own_state(sbs, hover):
         ("azimuth_step", 0.0, "azimuth_step = 0.0: allowed are 0.000174533 to 0.785398 rad"),
         ("azimuth_step", 60 * DEG, "azimuth_step = 1.0471975511965976: allowed are 0.000174533 to 0.785398 rad"),
         ("azimuth_step", math.nan, "azimuth_step = nan: allowed are 0.000174533 to 0.785398 rad"),
-        ("method", "euler", "method = 'euler': allowed are etd, rk4, tsit5, partitioned"),
+        ("method", "euler", "method = 'euler': allowed are auto, etd, rk4, tsit5, partitioned"),
     ],
 )
 def test_bad_options_are_refused(sbs, hover, option, value, line):

@@ -230,6 +230,42 @@ def governed(speed, integral):
     return {name: dx[place] for name, place in places.items()}
 
 
+def commanded(command, speed=0.98, **drive):
+    """Rates of a drive whose throttle and set point are commanded, (throttle, set point)."""
+    mixing = {"throttle": {"collective": 1.0}}
+    drive = {"rotors": ["R1", "R2"], "engine": {**ENGINE, "throttle": 0.2}, "mixing": mixing, **drive}
+    model = Model(driven([drive], [{}, {}], VACUUM))
+    x, places = model.state(), model.layout.drive(0)
+    x[places["Omega"]], x[places["engine_torque"]] = speed * model.speeds[0], 5.0
+    dx = model.derivative(x, np.array([[0.0] * 3, [0.0] * 3, [*command, 0.0]]))
+    return {name: dx[place] for name, place in places.items()}
+
+
+@pytest.mark.parametrize(("command", "throttle"), [(0.3, 0.3), (-0.1, 0.0), (1.2, 1.0)])
+def test_controls_set_the_throttle_of_an_engine_without_governor(command, throttle):
+    """Eq. (7.16): in place of that of the file, between 0 and 1."""
+    assert commanded((command, 1.0))["engine_torque"] == pytest.approx((throttle * 8.0 - 5.0) / 0.05)
+
+
+def test_controls_set_the_speed_of_a_governor_and_where_it_begins():
+    """Eq. (7.16) in (7.14)."""
+    mixing = {"throttle": {"collective": 0.5}, "set_point": {"collective": 0.1}}
+    found = commanded((0.3, 1.05), governor=GOVERNOR, mixing=mixing)
+    assert found["engine_torque"] == pytest.approx(((0.3 + 4.0 * 0.07) * 8.0 - 5.0) / 0.05)
+    assert found["governor"] == pytest.approx(3.0 * 0.07)
+
+
+def test_controls_are_mixed_to_commands_behind_the_swashplates():
+    """Factors times controls and what the file has without them; only drives with a mixing have a row."""
+    mixing = {"throttle": {"collective": 0.5}, "set_point": {"lateral_cyclic": 0.1}}
+    first = {"rotors": ["R1"], "engine": ENGINE}
+    second = {"rotors": ["R2"], "engine": {**ENGINE, "throttle": 0.2}, "governor": GOVERNOR, "mixing": mixing}
+    aircraft = driven([first, second], [{}, {}])
+    assert [row.owner for row in aircraft.rows] == ["R1", "R2", "drive 2"]
+    np.testing.assert_allclose(aircraft.mix([0.1, 0.2, 0.0, 0.0])[2], [0.2 + 0.05, 1.0 + 0.02, 0.0], rtol=1e-15)
+    assert driven([first, {**second, "mixing": {}}], [{}, {}]).mix([0.1, 0.2, 0.0, 0.0]).shape == (2, 3)
+
+
 def test_electric_motor():
     """Eq. (7.15): torque by the voltage that back-EMF leaves, and the charge that the battery gives."""
     battery = {"full_voltage": 50.0, "empty_voltage": 40.0, "capacity": 10.0}
@@ -278,6 +314,18 @@ def test_layout():
         ([{"rotors": ["R1"], "governor": {"proportional_gain": 1}}], "integral_gain = 0"),
         ([{"rotors": ["R1"], "battery": {"full_voltage": 10, "empty_voltage": 20}}], "empty_voltage = 20"),
         ([{"rotors": ["R1"], "engine": {"kind": "steam"}}], "drives.*engine.kind"),
+        (
+            [{"rotors": ["R1"], "mixing": {"throttle": {"collective": 1}}}],
+            r"drives\[0\].mixing: not allowed without an",
+        ),
+        (
+            [{"rotors": ["R1"], "engine": ENGINE, "mixing": {"set_point": {"collective": 1}}}],
+            r"drives\[0\].mixing.set_point: not allowed without a governor",
+        ),
+        (
+            [{"rotors": ["R1"], "engine": ENGINE, "mixing": {"throttle": {"stick": 1}}}],
+            r"drives\[0\].mixing.throttle.stick: unknown key, allowed are collective",
+        ),
         ([{"rotors": ["R1"], "engine": {"kind": "electric"}}], r"drives\[0\].engine.max_torque = 0"),
     ],
 )

@@ -1,0 +1,83 @@
+"""What pilot controls command: the swashplates of all rotors, and behind them drives that controls act on, in rows."""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.aircraft.description import Drive, Range
+from sbs_sim.model.state import COMMAND_NAMES, ROW, SWASHPLATE_NAMES
+
+if TYPE_CHECKING:
+    from sbs_sim.aircraft import Aircraft
+
+Array = NDArray[np.float64]
+
+THROTTLE_RANGE, SET_POINT_RANGE = (0.0, 1.0), (0.0, 2.0)  # of a command to a drive
+ROUNDING = 1e-12  # that a command may be beyond its range
+AT_ONCE = 1e9  # 1/s; a command to a drive has no actuator: the lag of its engine follows
+
+
+class Row(NamedTuple):
+    """Three numbers that are commanded together: of a swashplate, or of a drive, whose third is always zero.
+
+    Attributes
+    ----------
+    owner : str
+        Name of the rotor, or "drive 1".
+    names : tuple of str
+        Of the numbers; empty for what is not used.
+    ranges : tuple of (float, float)
+    unit : str
+        "rad" for a swashplate, "1" for a drive.
+    rate : float
+        Fastest motion of each [unit/s].
+    """
+
+    owner: str
+    names: tuple[str, ...]
+    ranges: tuple[Range, ...]
+    unit: str
+    rate: float
+
+    def shown(self, value: float) -> str:
+        """A value with its unit, as a person reads it."""
+        return f"{math.degrees(value):.6g} deg" if self.unit == "rad" else f"{value:.6g}"
+
+
+def rows_of(aircraft: "Aircraft") -> tuple[Row, ...]:
+    """Rows of an aircraft, in the order of `Aircraft.mix`."""
+    plates = [
+        Row(
+            rotor.name,
+            SWASHPLATE_NAMES,
+            (rotor.collective_range, rotor.cyclic_range, rotor.cyclic_range),
+            "rad",
+            rotor.swashplate_rate,
+        )
+        for rotor in aircraft.rotors
+    ]
+    names, ranges = (*COMMAND_NAMES, ""), (THROTTLE_RANGE, SET_POINT_RANGE, (0.0, 0.0))
+    return (*plates, *(Row(f"drive {i + 1}", names, ranges, "1", AT_ONCE) for i in aircraft.commanded_drives))
+
+
+def drive_offset(drive: Drive) -> Array:
+    """Row of a drive where all controls are zero, shape (3,)."""
+    return np.array([drive.throttle, drive.set_point, 0.0])
+
+
+def padded(factors: Array) -> Array:
+    """Factors of a drive, shape (2, n_controls), as a row of three numbers has them."""
+    return np.concatenate([factors, np.zeros((ROW - len(factors), factors.shape[1]))])
+
+
+def row_problems(rows: Sequence[Row], values: Array) -> list[tuple[str, float, Range, str]]:
+    """Name, value, range and unit of each command, of shape (n_rows, 3), that is beyond its range."""
+    return [
+        (f"{row.owner} {name}", value, limits, row.unit)
+        for row, numbers in zip(rows, values.tolist(), strict=True)
+        for name, value, limits in zip(row.names, numbers, row.ranges, strict=True)
+        if not limits[0] - ROUNDING <= value <= limits[1] + ROUNDING  # true for a NaN as well
+    ]

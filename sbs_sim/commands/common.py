@@ -18,6 +18,7 @@ from sbs_sim.terminal.command_line import Parser, assignment
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
+    from sbs_sim.concurrency.parallel import Execution
     from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 
 DEGREES = 180.0 / math.pi
@@ -140,6 +141,13 @@ def add_worker_arguments(group: "argparse._ArgumentGroup") -> None:
     )
 
 
+def execution(arguments: argparse.Namespace, progress: "Callable[..., None] | None") -> "Execution":
+    """Who makes the calls, with the progress that is shown."""
+    from sbs_sim.concurrency.parallel import Execution
+
+    return Execution(arguments.workers, progress, dask=arguments.dask)
+
+
 def aircraft(arguments: argparse.Namespace) -> "Aircraft":
     """The aircraft that the arguments select."""
     from sbs_sim.aircraft import Aircraft
@@ -253,7 +261,7 @@ def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], left: Se
         One for each column.
     rows : sequence of sequence of str
     left : sequence of int
-        Columns that stand at the left, as texts do; numbers stand at the right.
+        Columns aligned to the left, as texts are; the others, numbers, are aligned to the right.
     """
     table = [headings, *rows]
     widths = [max(len(row[i]) for row in table) for i in range(len(headings))]

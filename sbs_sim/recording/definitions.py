@@ -25,6 +25,7 @@ NUMBERS = {
     "float64": "f8",
 }
 PRIMITIVES = frozenset([*NUMBERS, "string", "wstring"])
+MAX_NESTING = 32  # levels of types in a type
 SEQUENCE = -1  # count of a field whose length is in the message
 SEPARATOR = "=" * 80
 
@@ -54,7 +55,7 @@ class Field:
     count : int or None
         None for a single value, the length of a fixed array, SEQUENCE for one of any length.
     units : tuple of str
-        What stands in brackets in the comment right above the field or behind it.
+        The text in brackets in the comment right above the field or behind it.
     """
 
     name: str
@@ -112,7 +113,7 @@ def message_definition(type_name: str, find_file: Callable[[str, str], Path]) ->
 
 
 def type_hash(type_name: str, find_file: Callable[[str, str], Path]) -> str:
-    """Hash by which ROS 2 tells types of one name apart (REP 2016), as the installed description of the type has it.
+    """Hash by which ROS 2 distinguishes types of one name (REP 2016), as the installed description of the type has it.
 
     Parameters
     ----------
@@ -134,7 +135,13 @@ def type_hash(type_name: str, find_file: Callable[[str, str], Path]) -> str:
 
 
 def parse(type_name: str, text: str) -> Definitions:
-    """Fields of a message type and of all types in it, from the joined text of `message_definition`."""
+    """Fields of a message type and of all types in it, from the joined text of `message_definition`.
+
+    Raises
+    ------
+    RecordingError
+        A type contains itself, or types are nested deeper than MAX_NESTING.
+    """
     definitions: Definitions = {}
     name = short_name(type_name)
     for part in re.split(r"^={3,}\s*$", text, flags=re.MULTILINE):
@@ -142,7 +149,19 @@ def parse(type_name: str, text: str) -> Definitions:
         if head:
             name, part = short_name(head[1]), part[head.end() :]
         definitions[name] = fields_of(part, name.split("/")[0])
+    _check_nesting(definitions, short_name(type_name), [], set())
     return definitions
+
+
+def _check_nesting(definitions: Definitions, kind: str, outer: list[str], checked: set[str]) -> None:
+    """Raise RecordingError for a type that contains itself, or is nested too deep in the outer ones."""
+    if kind in outer:
+        raise RecordingError(f"message type {kind} contains itself")
+    if len(outer) > MAX_NESTING:
+        raise RecordingError(f"message type {outer[0]} has more than {MAX_NESTING} levels of types in it")
+    for inner in {field.type for field in definitions.get(kind, ())} - PRIMITIVES - checked:
+        _check_nesting(definitions, inner, [*outer, kind], checked)
+    checked.add(kind)
 
 
 def fields_of(text: str, package: str) -> tuple[Field, ...]:
@@ -176,7 +195,7 @@ class Units:
     """Units of the fields of a message type by their flattened names.
 
     A field of a nested message that has no unit of its own has that of the field that holds it: the unit in the comment
-    there, or the one in its place if there are as many as the nested message has fields (force [N] and torque [N m]).
+    there, or the one at its index if there are as many as the nested message has fields (force [N] and torque [N m]).
     """
 
     def __init__(self, definitions: Definitions, root: str) -> None:
@@ -190,8 +209,8 @@ class Units:
 
     def _collect(self, kind: str, prefix: str, inherited: tuple[str, ...]) -> None:
         fields = self._definitions.get(kind, ())
-        for place, field in enumerate(fields):
-            units = field.units or (inherited[place : place + 1] if len(inherited) == len(fields) else inherited[:1])
+        for index, field in enumerate(fields):
+            units = field.units or (inherited[index : index + 1] if len(inherited) == len(fields) else inherited[:1])
             if field.type in PRIMITIVES:
                 unit = units[0] if units else ""
                 self._units[prefix + field.name] = _KNOWN_UNITS.get((kind, field.name), unit)

@@ -60,7 +60,7 @@ class FlightTopics:
 
     @property
     def title(self) -> str:
-        """What tells it from others: the topic of its states, and when it began."""
+        """What distinguishes it: the topic of its states, and when it began."""
         begin = self.recording_id.partition("-")[0]
         wall = f" started {wall_clock(int(begin))}" if begin.isdecimal() and int(begin) < MAX_WALL_TIME else ""
         return f"{self.roles[BODY][0]}{wall}"
@@ -96,7 +96,7 @@ def unclaimed(channels: Iterable[int], parts: Sequence[FlightTopics]) -> frozens
 
 
 def mixed(channels: Iterable[Channel], parts: Sequence[FlightTopics]) -> set[str]:
-    """Topics of some channels that several flights have in common, but for the one that tells the time."""
+    """Topics of some channels that several flights have in common, but for the one of the time."""
     owners: dict[str, set[int]] = {}
     for channel in channels:
         for number, part in enumerate(parts):
@@ -133,7 +133,7 @@ def _by_role(identity: str, channels: list[Channel]) -> FlightTopics:
 
 
 def _by_type(identity: str, channels: list[Channel], schemas: Mapping[int, Schema]) -> Iterator[FlightTopics]:
-    """One flight for each topic with states, and for each the topics of the other types that stand beside it."""
+    """One flight for each topic with states, and for each the topics of the other types in its namespace."""
     topics: dict[str, dict[str, list[int]]] = {role: {} for role in TYPES}
     for channel in channels:
         kind = schemas.get(channel.schema_id)

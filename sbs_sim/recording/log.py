@@ -82,7 +82,7 @@ class Topic(Mapping[str, NDArray[Any]]):
             if values.ndim == 1:
                 columns[name] = values
             else:
-                columns.update({f"{name}[{place}]": values[:, place] for place in range(values.shape[1])})
+                columns.update({f"{name}[{i}]": values[:, i] for i in range(values.shape[1])})
         return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
 
     @cached_property
@@ -164,7 +164,7 @@ class Log(Mapping[str, Topic]):
 
     @property
     def title(self) -> str:
-        """What tells the flight from others: aircraft, topic of its states, and when it began."""
+        """What distinguishes the flight: aircraft, topic of its states, and when it began."""
         aircraft = self.metadata.get("simulation", {}).get("aircraft", "")
         return " on ".join(filter(None, (aircraft, "" if self._part is None else self._part.title)))
 

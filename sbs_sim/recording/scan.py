@@ -15,11 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    Channel,
-    Schema,
-)
+from mcap.records import Attachment, Channel, Schema
 
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording.checked_records import (
@@ -36,10 +32,7 @@ from sbs_sim.recording.checked_records import (
     loose_records_at,
 )
 from sbs_sim.recording.checksum_policy import OTHER_RECORDS, OptionalChecksums, has_own_checksum, open_recording
-from sbs_sim.recording.mcap_file import (
-    MAGIC,
-    ROSBAG2,
-)
+from sbs_sim.recording.mcap_file import MAGIC, ROSBAG2
 from sbs_sim.recording.source import DamageError, Source
 from sbs_sim.recording.summary import Summary
 
@@ -112,7 +105,7 @@ def scan(source: Source, take: Callable[[Content], None]) -> Scan:
     elif summary is not None:
         found.complete = _nothing_missing(summary, found)
     if found.unlisted:
-        found.reasons.append(f"{found.unlisted} more places like these")
+        found.reasons.append(f"{found.unlisted} more reasons like these")
     if summary is None:
         closed = data_end or (source.size >= len(MAGIC) and source.at(source.size - len(MAGIC), len(MAGIC)) == MAGIC)
         found.reasons.append("the summary is damaged" if closed else "the recording was not closed: it has no end")

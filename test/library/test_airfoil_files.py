@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from sbs_sim.aircraft.airfoil_files.c81 import c81_text
 from sbs_sim.aircraft.airfoil_files.extension import METHODS, broadside_drag
 from sbs_sim.aircraft.airfoil_files.table import at_reynolds, table_of
 from sbs_sim.errors import AirfoilError
-from sbs_sim.model.airfoil import interpolate, read_table
+from sbs_sim.model.airfoil import AirfoilTable, interpolate, read_table
 
 ROOT = Path(__file__).resolve().parents[2]
 EXECUTABLE = ROOT / "install" / "sbs_sim" / "lib" / "sbs_sim" / "airfoil"
@@ -254,6 +255,20 @@ def test_c81_tables_come_back(tmp_path, name):
         np.testing.assert_allclose(again.cd[i], cd, rtol=0, atol=errors[1] + 5.1e-5)
     assert errors[0] < 0.002
     assert errors[1] < 0.001
+
+
+def test_a_c81_file_that_is_read_and_written_again_is_the_same_file(tmp_path):
+    """Different angles of lift and drag, 14 Mach numbers over two lines, numbers that need a sign and three digits."""
+    mach, angles = np.arange(14) * 0.07, np.array([-180, -90, -40, -8, 0, 6.5, 12, 40, 90, 180]) * DEG
+    cl = np.sin(2 * angles) * (1.2 + mach[:, None])
+    table = AirfoilTable("w", mach, angles, cl, 0.01 + np.sin(angles) ** 2 * np.ones_like(cl), axis="mach")
+    text, errors = c81_text(table, "A WING")
+    again, name, _ = import_airfoil([write(tmp_path, "a.c81", text)], extension=None)
+    assert errors == (0.0, 0.0)
+    at = np.rint(np.degrees(again.alpha) * 100).astype(int).tolist()
+    kept = [at.index(angle) for angle in np.rint(np.degrees(angles) * 100).astype(int).tolist()]
+    np.testing.assert_allclose(again.cl[:, kept][:, 1:-1], cl[:, 1:-1], rtol=0, atol=5.1e-4)
+    assert c81_text(replace(again, alpha=angles, cl=again.cl[:, kept], cd=again.cd[:, kept]), name)[0] == text
 
 
 # --- extensions -------------------------------------------------------------------------------------

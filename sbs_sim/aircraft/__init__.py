@@ -223,8 +223,12 @@ class Aircraft(Description):
 
     @cached_property
     def passages(self) -> tuple[int, ...]:
-        """How often each rotor is the same again in one revolution: with every blade, or once if its blades differ."""
-        return tuple(rotor.blades if rotor.has_equal_blades else 1 for rotor in self.rotors)
+        """How often each rotor and its multiblade coordinates are the same again in one revolution.
+
+        With every blade; with every other one of an even number, whose differential coordinate changes its sign from
+        one to the next; once if the blades differ.
+        """
+        return tuple(_passages(rotor) for rotor in self.rotors)
 
     @cached_property
     def parameter_hash(self) -> str:
@@ -561,6 +565,13 @@ def _digest(digest: Any, name: str, value: Any) -> None:
         return
     values = np.ascontiguousarray(value, dtype=np.float64) + 0.0  # there is one zero
     digest.update(f"{name}{values.shape}".encode() + values.tobytes())
+
+
+def _passages(rotor: Rotor) -> int:
+    """See `Aircraft.passages`."""
+    if not rotor.has_equal_blades:
+        return 1
+    return rotor.blades // 2 if rotor.blades % 2 == 0 else rotor.blades
 
 
 def _blades_inertia(rotor: Rotor) -> Array:

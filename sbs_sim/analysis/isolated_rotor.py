@@ -103,7 +103,7 @@ class IsolatedRotor:
         self.aircraft, self.fidelity = aircraft, fidelity or Fidelity()
         self.rotor, self.layout = aircraft.rotors[0], aircraft.layout
         self._free = np.flatnonzero(aircraft.body.stand_free) if aircraft.body.is_stand else np.zeros(0, dtype=np.int64)
-        self._azimuths = azimuths(_repeats(aircraft), self.fidelity.azimuth_count)
+        self._azimuths = azimuths(aircraft.passages, self.fidelity.azimuth_count)
         self.places, self.rate_places = self._unknowns()
         is_inflow, is_speed = self._is_inflow(self.rate_places), self.rate_places >= self.layout.drives_start
         self._scales = np.where(is_inflow, self.rotor.speed, self.rotor.speed**2)
@@ -303,16 +303,6 @@ class IsolatedRotor:
             )
             columns.append((after - before)[:, used] / (2.0 * step))
         return np.stack(columns, axis=-1)
-
-
-def _repeats(aircraft: Aircraft) -> tuple[int]:
-    """How often the rotor with its multiblade coordinates is the same again in a revolution.
-
-    With every blade; with every other one of an even number, whose differential coordinate changes sign from one to
-    the next.
-    """
-    passages = aircraft.passages[0]
-    return (passages // 2 if passages % 2 == 0 else passages,)
 
 
 def _with(x: Array, places: IntArray, values: Array) -> Array:

@@ -12,7 +12,7 @@ from sbs_sim.model.kernel import entry
 def azimuths(passages: Sequence[int], count: int) -> NDArray[np.float64]:
     """Azimuth configurations of eq. [15]: the first blade of each rotor [rad], shape (count, n_rotors).
 
-    `passages` is how often a rotor is the same again in one revolution: the number of its blades if these are alike.
+    `passages` is how often a rotor with its multiblade coordinates is the same again in one revolution.
     """
     return 2.0 * math.pi * np.arange(count)[:, None] / (np.array(passages) * count)
 

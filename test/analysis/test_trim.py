@@ -46,6 +46,15 @@ def disc_area(rotor):
     return math.pi * rotor.radius**2
 
 
+def test_the_differential_coordinates_of_four_blades_have_no_mean():
+    """They change sign with every blade: loads of twice per revolution move them, and leave no mean."""
+    four = build(every_rotor={"blades": 4, "blade_mass": 0.12, "chord": {"root": 0.038, "tip": 0.038}})
+    point = trim(four, 20.0)
+    differential = [value for name, value in zip(point.state_names, point.state, strict=True) if "d(" in name]
+    assert len(differential) == 2 * 2 * 2
+    np.testing.assert_allclose(differential, 0.0, atol=1e-9)
+
+
 # -- equilibrium ---------------------------------------------------------------------------------------------
 
 

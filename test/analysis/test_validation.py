@@ -18,6 +18,7 @@ from sbs_sim.analysis.reproduce import reproduce
 from sbs_sim.analysis.validation import CASES, Aim, Case, Report, compared, data, validate
 from sbs_sim.analysis.validation.comparison import COMPARED, MET, MISSED, spread
 from sbs_sim.analysis.validation.formats import markdown, page_text
+from sbs_sim.analysis.validation.pca2 import Search
 from sbs_sim.errors import TrimError, ValidationError
 from sbs_sim.flight.trim_point import Fidelity
 
@@ -252,6 +253,16 @@ def test_a_rotor_without_engine_finds_the_speed_at_which_it_takes_no_torque():
     state[craft.layout.drive(0)["Omega"]] *= 0.9
     flight = simulate(craft, state, np.zeros(4), 40.0, method="rk4", lead_lag=False)
     assert flight["Omega(1)"][-1] == pytest.approx(point.speed, rel=0.01)  # but for waves in the blades' own axes
+
+
+def test_the_autorotations_that_are_compared_last():
+    """Found with a flywheel; without it the rotor keeps its speed and its flapping."""
+    craft, found = Aircraft.load("pca2"), Search("speed").to(0.2, 11000.0)
+    assert found.thrust == pytest.approx(11000.0, rel=1e-5)
+    flight = simulate(craft, found.state, np.zeros(4), 30.0, method="rk4", lead_lag=False)
+    assert flight["Omega(1)"][-1] == pytest.approx(found.speed, rel=1e-3)
+    last = flight["state"][-200:, craft.layout.flap(0)].mean(axis=0)
+    assert last[:3] == pytest.approx(found.flapping, abs=1e-4)
 
 
 def test_a_rotor_with_an_engine_is_refused_and_a_free_one_has_no_exponents():

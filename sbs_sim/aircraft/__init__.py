@@ -274,7 +274,8 @@ class Aircraft(Description):
         """Swashplate angles of all rotors [rad], shape (n_rotors, 3), of the pilot controls, shape (n_controls,).
 
         Of an aircraft whose controls act on drives too, a row for each such drive follows: throttle, set point of the
-        governor over the speed in the file, and zero; see `rows`. All that is called swashplate has these rows.
+        governor over the speed in the file, and zero; then for each surface that controls act on one with the incidence
+        that they add [rad], and zeros; see `rows`. All that is called swashplate has these rows.
         """
         angles = np.empty((3 * len(self.rows), 1))
         mixed(self.rigging, np.asarray(controls, dtype=float).reshape(-1, 1), ONE, angles)
@@ -282,7 +283,7 @@ class Aircraft(Description):
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """What pilot controls command: the swashplate of each rotor, and each drive that controls act on."""
+        """What pilot controls command: the swashplate of each rotor, and drives and surfaces that controls act on."""
         return rows_of(self)
 
     @cached_property
@@ -291,10 +292,17 @@ class Aircraft(Description):
         return tuple(i for i, drive in enumerate(self.drives) if drive.mixing)
 
     @cached_property
+    def commanded_surfaces(self) -> tuple[int, ...]:
+        """Indices of the surfaces that pilot controls act on."""
+        return tuple(i for i, surface in enumerate(self.body.surfaces) if surface.mixing)
+
+    @cached_property
     def mixing(self) -> Array:
         """Swashplate angles of all rotors over the pilot controls, shape (3 n_rows, n_controls), see `mix`."""
-        drives = [padded(self._factors(self.drives[i].mixing)) for i in self.commanded_drives]
-        return frozen(np.concatenate([*(self._factors(rotor.mixing) for rotor in self.rotors), *drives]))
+        moved = [self.drives[i].mixing for i in self.commanded_drives]
+        moved += [self.body.surfaces[i].mixing for i in self.commanded_surfaces]
+        others = [padded(self._factors(mixing)) for mixing in moved]
+        return frozen(np.concatenate([*(self._factors(rotor.mixing) for rotor in self.rotors), *others]))
 
     def _digest_part(self, digest: Any, part: object) -> None:
         """Add the values of a part of the file that have not their default, those of its own parts included."""
@@ -310,7 +318,7 @@ class Aircraft(Description):
                 self._digest_part(digest, inner)
 
     def _factors(self, mixing: Mapping[str, Mapping[str, float]]) -> Array:
-        """Factors of one rotor, shape (3, n_controls), or of one drive, shape (2, n_controls)."""
+        """Factors of one rotor, shape (3, n_controls), or of one drive (2, n_controls) or surface (1, n_controls)."""
         return np.array([[row.get(name, 0.0) for name in self.control_names] for row in mixing.values()])
 
     @cached_property
@@ -318,7 +326,8 @@ class Aircraft(Description):
         """`mixing`, and as its last column the swashplate angles where all controls are zero [rad]."""
         drives = [drive_offset(self.drives[i]) for i in self.commanded_drives]
         offsets = np.concatenate([*(rotor.swashplate_offset for rotor in self.rotors), *drives])
-        return frozen(np.column_stack([self.mixing, offsets]))
+        surfaces = np.zeros(3 * len(self.commanded_surfaces))
+        return frozen(np.column_stack([self.mixing, np.concatenate([offsets, surfaces])]))
 
     @cached_property
     def control_names(self) -> tuple[str, ...]:

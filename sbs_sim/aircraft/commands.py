@@ -1,4 +1,4 @@
-"""What pilot controls command: the swashplates of all rotors, and behind them drives that controls act on, in rows."""
+"""What pilot controls command, in rows: the swashplates of all rotors, and drives and surfaces that controls act on."""
 
 import math
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.aircraft.description import Drive, Range
+from sbs_sim.aircraft.description import INCIDENCE, Drive, Range
 from sbs_sim.model.state import COMMAND_NAMES, ROW, SWASHPLATE_NAMES
 
 if TYPE_CHECKING:
@@ -16,22 +16,23 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 THROTTLE_RANGE, SET_POINT_RANGE = (0.0, 1.0), (0.0, 2.0)  # of a command to a drive
+NONE = (0.0, 0.0)  # of what is not used
 ROUNDING = 1e-12  # that a command may be beyond its range
 AT_ONCE = 1e9  # 1/s; a command to a drive has no actuator: the lag of its engine follows
 
 
 class Row(NamedTuple):
-    """Three numbers that are commanded together: of a swashplate, or of a drive, whose third is always zero.
+    """Three numbers that are commanded together, of a swashplate, a drive or a surface; those not used are zero.
 
     Attributes
     ----------
     owner : str
-        Name of the rotor, or "drive 1".
+        Name of the rotor or surface, or "drive 1".
     names : tuple of str
         Of the numbers; empty for what is not used.
     ranges : tuple of (float, float)
     unit : str
-        "rad" for a swashplate, "1" for a drive.
+        "rad" for a swashplate and a surface, "1" for a drive.
     rate : float
         Fastest motion of each [unit/s].
     """
@@ -59,8 +60,14 @@ def rows_of(aircraft: "Aircraft") -> tuple[Row, ...]:
         )
         for rotor in aircraft.rotors
     ]
-    names, ranges = (*COMMAND_NAMES, ""), (THROTTLE_RANGE, SET_POINT_RANGE, (0.0, 0.0))
-    return (*plates, *(Row(f"drive {i + 1}", names, ranges, "1", AT_ONCE) for i in aircraft.commanded_drives))
+    names, ranges = (*COMMAND_NAMES, ""), (THROTTLE_RANGE, SET_POINT_RANGE, NONE)
+    drives = (Row(f"drive {i + 1}", names, ranges, "1", AT_ONCE) for i in aircraft.commanded_drives)
+    moving = (aircraft.body.surfaces[i] for i in aircraft.commanded_surfaces)
+    surfaces = (
+        Row(one.name, (INCIDENCE, "", ""), (one.incidence_range, NONE, NONE), "rad", one.incidence_rate)
+        for one in moving
+    )
+    return (*plates, *drives, *surfaces)
 
 
 def drive_offset(drive: Drive) -> Array:
@@ -69,7 +76,7 @@ def drive_offset(drive: Drive) -> Array:
 
 
 def padded(factors: Array) -> Array:
-    """Factors of a drive, shape (2, n_controls), as a row of three numbers has them."""
+    """Factors of a drive or surface, shape (1 or 2, n_controls), as a row of three numbers has them."""
     return np.concatenate([factors, np.zeros((ROW - len(factors), factors.shape[1]))])
 
 

@@ -208,10 +208,12 @@ def _control_problems(aircraft: "Aircraft") -> list[str]:
             unknown = [name for name in factors if name not in names]
             where = ", ".join(f"rotors[{i}].mixing.{angle}.{name}" for name in unknown)
             problems += [f"{where}: unknown key, allowed are {', '.join(names)}"] if unknown else []
-    for i, drive in enumerate(aircraft.drives):
-        for command, factors in drive.mixing.items():
+    parts = [(f"drives[{i}]", drive.mixing) for i, drive in enumerate(aircraft.drives)]
+    parts += [(f"body.surfaces[{i}]", surface.mixing) for i, surface in enumerate(aircraft.body.surfaces)]
+    for path, mixing in parts:
+        for command, factors in mixing.items():
             unknown = [name for name in factors if name not in names]
-            where = ", ".join(f"drives[{i}].mixing.{command}.{name}" for name in unknown)
+            where = ", ".join(f"{path}.mixing.{command}.{name}" for name in unknown)
             problems += [f"{where}: unknown key, allowed are {', '.join(names)}"] if unknown else []
     return problems
 

@@ -52,6 +52,7 @@ MAX_ROTORS, MAX_CONTROLS, MAX_SURFACES = 16, 16, 32
 MAX_CONTROL = 1e6  # of a control that is no angle, in its unit
 TRIMMED_CONTROLS = 4  # that a trim finds
 MAX_BLADES = 20
+INCIDENCE = "incidence"  # of a surface, as pilot controls command it
 STAND_AXES = tuple(DEFLECTIONS)
 
 
@@ -169,6 +170,20 @@ class Polar(ByContent):
     drag: Array = series("Drag coefficients", 0, 10, "1")
 
 
+def _incidence_mixing() -> Any:
+    """Field with the incidence over the pilot controls, as `_mixing` has the angles of a swashplate."""
+    schema = mapping_schema({INCIDENCE: named_schema(number_schema(-10, 10))}, [INCIDENCE])
+
+    def factors(rows: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+        return {name: {key: float(value) for key, value in row.items()} for name, row in rows.items()}
+
+    text = (
+        "Incidence that pilot controls add to that of the file: sum of factor x control, in rad per rad, or per unit of"
+        " a control that is no angle; without it no control acts on the surface"
+    )
+    return declared(text, schema, factors, unit="rad/rad", default={})
+
+
 @dataclass(frozen=True, eq=False)
 class Surface(ByContent):
     """One lifting surface.
@@ -199,6 +214,13 @@ class Surface(ByContent):
     schedule: Schedule = part("Incidence over the airspeed", Schedule, default={})
     polar: Polar = part("Coefficients over the angle of attack", Polar, default={})
     wash: Wash = part("Wash of a rotor", Wash, default={})
+    mixing: dict[str, dict[str, float]] = _incidence_mixing()
+    incidence_range: Range = interval(
+        "Range of the incidence that pilot controls add", -90, 90, "deg", default=[-90, 90], is_physics=False
+    )
+    incidence_rate: float = number(
+        "Fastest motion of that incidence", 0, 1e6, "deg/s", above_minimum=True, default=1e6, is_physics=False
+    )
 
     @property
     def slope(self) -> float:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft.declaration import model_values
 from sbs_sim.aircraft.description import ENGINES, Body, Drive, Rotor
-from sbs_sim.aircraft.surfaces import parts_of
+from sbs_sim.aircraft.surfaces import Parts, parts_of
 from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import DEGREE, AirfoilTable, Grid, cell_grid, cells, common_grid
 from sbs_sim.model.elementary import cosine_and_sine
@@ -52,7 +52,7 @@ def model_of(aircraft: "Aircraft") -> R.Model:
         knots=knots,
         table=table,
         stall=_stall(aircraft),
-        **parts_of(aircraft.body, aircraft.rotors)._asdict(),
+        **_parts(aircraft)._asdict(),
     )
 
 
@@ -68,6 +68,16 @@ def _packed_tables(aircraft: "Aircraft", grids: list[Grid]) -> tuple[Array, list
     packed = R.aligned((sum(map(len, parts.values())), 4 * (DEGREE + 1)), float)
     packed[:] = np.concatenate(list(parts.values()))
     return packed, [[starts[key] for key in keys] for keys in found]
+
+
+def _parts(aircraft: "Aircraft") -> Parts:
+    """Surfaces and fuselage, and where the commands to surfaces are."""
+    parts = parts_of(aircraft.body, aircraft.rotors)
+    parts.surfaces["command_index"] = -1
+    first = len(aircraft.rotors) + len(aircraft.commanded_drives)
+    for row, i in enumerate(aircraft.commanded_surfaces, first):
+        parts.surfaces["command_index"][i] = ROW * row
+    return parts
 
 
 def _stall(aircraft: "Aircraft") -> Array:

@@ -24,6 +24,7 @@ def part_problems(aircraft: "Aircraft") -> list[str]:
             *_schedule_problems(surface.schedule),
             *_polar_problems(surface.polar),
             *_stall_problems(surface),
+            *_range_problems(surface),
         ]
         problems += [f"body.surfaces[{i}].{problem}" for problem in found]
     fuselage = aircraft.body.fuselage
@@ -80,6 +81,13 @@ def _stall_problems(surface: Surface) -> list[str]:
         return []
     limit = (math.radians(MAX_STALL_DEG) - abs(surface.zero_lift_angle)) * surface.slope
     return [f"max_lift = {surface.max_lift}: allowed is <= {limit:.3g}, for a stall at no more than 60 deg"]
+
+
+def _range_problems(surface: Surface) -> list[str]:
+    low, high = (round(math.degrees(value), 9) for value in surface.incidence_range)
+    if low <= 0.0 <= high:
+        return []
+    return [f"incidence_range_deg = [{low:g}, {high:g}]: allowed is a range with zero in it"]
 
 
 def _fuselage_problems(fuselage: Fuselage) -> list[str]:

@@ -212,7 +212,9 @@ class IsolatedRotor:
         """Rates (m, size) and loads (m, 8) of states at as many azimuths; the hub accelerates on a stand alone."""
         engine = points_engine(self.aircraft.arranged(self.fidelity.lead_lag, self.fidelity.cyclic_inflow, "points"))
         rates, loads = np.empty((len(states), self.layout.size)), np.empty((len(states), R.LOAD_SIZE))
-        angles, still_air, left = engine.lanes([swash]), engine.memory(3), engine.memory(6)
+        commands = np.zeros(S.ROW * len(self.aircraft.rows))  # those to surfaces are zero
+        commands[: len(swash)] = swash
+        angles, still_air, left = engine.lanes([commands]), engine.memory(3), engine.memory(6)
         for first in range(0, len(states), engine.n):
             part = slice(first, min(first + engine.n, len(states)))
             count, slopes = part.stop - part.start, engine.tick.slopes[0]

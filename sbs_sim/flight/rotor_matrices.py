@@ -93,7 +93,9 @@ def _rates_by_states(aircraft: "Aircraft", lead_lag: bool, cyclic_inflow: bool) 
         for part in (layout.flap_rate(j), layout.lag_rate(j)):
             steps[part.start - offset : part.stop - offset] = ANGLE_STEP * rotor.speed
         steps[layout.inflow(j).start - offset : layout.inflow(j).stop - offset] = INFLOW_STEP
-    swashplates = np.eye(len(point) - size, len(point) - size + 1)  # controls are their angles, without a constant
+    # controls are the angles of the swashplates, without a constant, and there are no other commands
+    swashplates = np.eye(S.ROW * len(aircraft.rows), len(point) - size + 1)
+    swashplates[len(point) - size :] = 0.0
     found = engine.jacobian(point, swashplates, steps, layout.linear_owners, np.zeros((1, rotors)))
     linear = np.zeros((layout.size, layout.size))
     first = S.LINEAR_BODY_SIZE

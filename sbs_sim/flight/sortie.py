@@ -3,7 +3,7 @@
 from __future__ import annotations  # `help` then shows types by their names
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight.validity import flight_warnings
+from sbs_sim.model.records import FUSELAGE, INTEGER, SURFACE, Model
 from sbs_sim.model.wind import Wind
 
 Array = NDArray[np.float64]
@@ -180,8 +181,14 @@ def structure(simulation: Simulation) -> Any:
     return (
         *(blades, aircraft.options, sections, simulation.steps_per_tick, simulation.method),
         *(simulation.tick, simulation.step, model.switches.tobytes()),
-        *(aircraft.layout.drives, *(part.tobytes() for part in drives)),
+        *(aircraft.layout.drives, *(part.tobytes() for part in drives), *_integers(model)),
     )
+
+
+def _integers(model: Model) -> Iterator[bytes]:
+    """What lanes have in common of surfaces and fuselages, and how many of them there are."""
+    for kind, records in ((SURFACE, model.surfaces), (FUSELAGE, model.fuselages)):
+        yield from (records[name].tobytes() for name, shape in kind.items() if shape is INTEGER)
 
 
 def _block(simulation: Simulation, flights: int) -> int:

@@ -87,10 +87,11 @@ def driven_derivative(model, x, swash, psi, wind, work, dx, with_loads):
         memory.state[i] = given[i]
     set_turning(aircraft, memory.state, kept, drives, as_lanes(psi, like), turning)
     flight = body_motion(aircraft, memory.state, as_lanes(wind, like))
-    loads = set_known_loads(aircraft, memory, flight, as_lanes(swash, like), turning[AZIMUTHS])
+    commands = as_lanes(swash, like)
+    loads = set_known_loads(aircraft, memory, flight, commands, turning[AZIMUTHS])
     loads = transmission_loads(memory.state, drives, flight, loads)
     for i in range(drives.shape[0]):
-        set_drive_rates(memory.state, drives[i], shafts[i], as_lanes(swash, like), out)
+        set_drive_rates(memory.state, drives[i], shafts[i], commands, out)
         eliminate(aircraft, memory, drives, i, shafts[i])
     solve_coupled_body(aircraft, memory, flight, loads)
     solve_blades(aircraft, memory)

@@ -123,8 +123,9 @@ def derivative(model, x, swash, psi, wind, work, dx, with_loads):
     model : Model
     x : ndarray, shape (size, n)
         Simulation state, see `sbs_sim.model.state`.
-    swash : ndarray, shape (3 n_rotors, n)
-        Collective, lateral and longitudinal cyclic pitch of each rotor [rad].
+    swash : ndarray, shape (3 n_rows, n)
+        Collective, lateral and longitudinal cyclic pitch of each rotor [rad]; behind them what else controls command,
+        see `sbs_sim.Aircraft.mix`.
     psi : ndarray, shape (n_rotors, n)
         Azimuth of the first blade of each rotor, 0 aft, growing with the rotation [rad].
     wind : ndarray, shape (3, n)
@@ -213,7 +214,7 @@ def set_known_loads(aircraft, memory, flight, swash, psi):
     set_blade_terms(aircraft, memory, flight, swash, psi)
     sum_blades(aircraft, memory)
     set_hub_velocities(aircraft, memory, flight)
-    return body_loads(aircraft, memory, flight)
+    return body_loads(aircraft, memory, flight, swash)
 
 
 @kernel
@@ -466,7 +467,7 @@ def set_hub_velocities(aircraft, memory, flight):
 
 
 @kernel
-def body_loads(aircraft, memory, flight):
+def body_loads(aircraft, memory, flight, swash):
     """Loads on the rigid part: fuselage, surfaces, ducts and gyroscopic terms, first part of eq. (5.7)."""
     air, body, omega = aircraft.air[0], aircraft.body[0], flight.omega
     drag = plate_drag(air.density, air.plate_areas, flight.air_velocity)
@@ -478,7 +479,7 @@ def body_loads(aircraft, memory, flight):
     for i in range(aircraft.surfaces.shape[0]):
         surface, ramps = aircraft.surfaces[i], aircraft.ramps[i]
         wash = wash_at(aircraft, memory, surface, ramps)
-        load = surface_load(air.density, surface, ramps, aircraft.shapes, flight.air_velocity, omega, wash)
+        load = surface_load(air.density, surface, ramps, aircraft.shapes, swash, flight.air_velocity, omega, wash)
         force, moment = force + load.force, moment + load.moment
     for i in range(aircraft.fuselages.shape[0]):
         fuselage, ramps = aircraft.fuselages[i], aircraft.ramps[aircraft.surfaces.shape[0] + i]

@@ -170,6 +170,7 @@ SURFACE = {
     "first_row": LANES,
     "rotor": INTEGER,  # whose wash it meets, -1 for none
     "is_scheduled": INTEGER,
+    "command_index": INTEGER,  # of its incidence behind the swashplate angles; -1 where no control acts
 }
 FUSELAGE = {
     "position": VECTOR,

@@ -49,7 +49,7 @@ def steady_balance(model, x, swash, psi, wind, work, dx, imbalance):
     set_blade_terms(aircraft, memory, flight, as_lanes(swash, like), as_lanes(psi, like))
     sum_blades(aircraft, memory)
     set_hub_velocities(aircraft, memory, flight)
-    loads = body_loads(aircraft, memory, flight)
+    loads = body_loads(aircraft, memory, flight, as_lanes(swash, like))
     steady = cross(flight.omega, flight.velocity) - flight.gravity
     set_acceleration(memory, steady, Vector(0.0, 0.0, 0.0))
     if aircraft.switches[0].complete_coupling == 1:

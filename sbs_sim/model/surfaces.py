@@ -14,7 +14,7 @@ RAMP_COLUMNS = 5
 
 
 @kernel
-def surface_load(density, surface, ramps, shapes, motion, omega, wash):
+def surface_load(density, surface, ramps, shapes, commands, motion, omega, wash):
     """Load of a lifting surface, eq. (5.15).
 
     Parameters
@@ -25,6 +25,8 @@ def surface_load(density, surface, ramps, shapes, motion, omega, wash):
     ramps : lanes, shape (points, 5)
     shapes : ndarray, shape (cells, 16)
         Coefficients of lift and drag over the angle of attack.
+    commands : lanes, shape (3 n_rows,)
+        Swashplate angles, and behind them what else pilot controls command.
     motion, omega : Vector
         Velocity of the c.g. relative to the air [m/s] and angular velocity [rad/s], body axes.
     wash : Vector
@@ -39,6 +41,8 @@ def surface_load(density, surface, ramps, shapes, motion, omega, wash):
     incidence = surface.incidence
     if surface.is_scheduled == 1:
         incidence = incidence + ramp(ramps, AIRSPEED, INCIDENCE, sqrt(dot(own, own)))
+    if surface.command_index >= 0:
+        incidence = incidence + commands[surface.command_index]
     local = own + wash
     u, w = local.x, dot(surface.down, local)
     squared = u * u + w * w + TINY

@@ -20,7 +20,7 @@ from sbs_sim.model.average import azimuths
 from sbs_sim.nodes.conversions import (
     StateMessages,
     axis_controls_message,
-    command_messages,
+    command_fields,
     float64_array,
     swashplate_messages,
 )
@@ -38,7 +38,7 @@ def trim_message(aircraft: Aircraft, point: trim.TrimPoint) -> TrimPoint:
         roll=point.roll,
         pitch=point.pitch,
         swashplate=swashplate_messages(point.swashplate[: len(aircraft.rotors)]),
-        drives=command_messages(point.swashplate[len(aircraft.rotors) :]),
+        **command_fields(aircraft, point.swashplate),
         rotors=rotors.rotors.rotors,
         inflow=rotors.inflow.rotors,
         state_names=point.state_names,

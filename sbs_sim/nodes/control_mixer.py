@@ -28,7 +28,7 @@ from sbs_sim.nodes.command_monitor import CommandMonitor
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.conversions import (
     FRAME_BODY,
-    command_messages,
+    command_fields,
     controls_array,
     swashplate_messages,
     to_seconds,
@@ -171,11 +171,11 @@ class ControlMixer(Component):
         """Go towards the target and publish."""
         now = self._moved_at = self._now()
         angles = self._mixer.move(now)
-        message = SwashplateArray()
+        aircraft = self._mixer.aircraft
+        message = SwashplateArray(**command_fields(aircraft, angles))
         message.header.stamp = to_time(now)
         message.header.frame_id = FRAME_BODY
-        message.rotors = swashplate_messages(angles[: len(self._mixer.aircraft.rotors)])
-        message.drives = command_messages(angles[len(self._mixer.aircraft.rotors) :])
+        message.rotors = swashplate_messages(angles[: len(aircraft.rotors)])
         self._output.publish(message)
         if self._mixer.arrived:
             self._ramp.cancel()

@@ -8,6 +8,7 @@ import array
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -88,6 +89,7 @@ def swashplate_array(message: SwashplateArray) -> Array:
     """Swashplate angles [rad], shape (n_rows, 3), see `Aircraft.mix`."""
     angles = [[getattr(rotor, name) for name in S.SWASHPLATE_NAMES] for rotor in message.rotors]
     angles += [[*(getattr(drive, name) for name in S.COMMAND_NAMES), 0.0] for drive in message.drives]
+    angles += [[incidence, 0.0, 0.0] for incidence in message.incidence]
     return np.array(angles, dtype=float).reshape(-1, S.ROW)
 
 
@@ -96,9 +98,11 @@ def swashplate_messages(angles: Array) -> list[Swashplate]:
     return [Swashplate(**dict(zip(S.SWASHPLATE_NAMES, row, strict=True))) for row in angles.tolist()]
 
 
-def command_messages(rows: Array) -> list[DriveCommand]:
-    """One message per drive of the rows behind those of the rotors, shape (n, 3)."""
-    return [DriveCommand(**dict(zip(S.COMMAND_NAMES, row, strict=False))) for row in rows.tolist()]
+def command_fields(aircraft: Aircraft, rows: Array) -> dict[str, Any]:
+    """Fields `drives` and `incidence` of a message, of commands of shape (n_rows, 3)."""
+    first, behind = len(aircraft.rotors), len(aircraft.rotors) + len(aircraft.commanded_drives)
+    drives = [DriveCommand(**dict(zip(S.COMMAND_NAMES, row, strict=False))) for row in rows[first:behind].tolist()]
+    return {"drives": drives, "incidence": float64_array(np.ascontiguousarray(rows[behind:, 0]))}
 
 
 def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:

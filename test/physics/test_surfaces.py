@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from helpers import Model, aircraft_data, build
 
+from sbs_sim import linearize, simulate, trim
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.surfaces import surface_polar
 from sbs_sim.errors import AircraftError
+from sbs_sim.flight.mixer import Mixer
 from sbs_sim.model.packing import side_by_side
 
 DENSITY = 1.225
@@ -117,6 +119,50 @@ def test_the_incidence_follows_the_airspeed_without_the_wash():
     wash = {"rotor": "R1", "down": [3.0]}
     scheduled, fixed = surface(schedule=schedule, wash=wash), surface(incidence_deg=30.0, wash=wash)
     np.testing.assert_allclose(loads(scheduled, lambda0=0.1), loads(fixed, lambda0=0.1), rtol=1e-12)
+
+
+STABILATOR = {"range_deg": [-20.0, 20.0], "axis": "none", "held_deg": 0.0}
+
+
+def with_stabilator(**changes):
+    """Return an aircraft whose tailplane has its incidence from a control; it begins at 2 deg."""
+    data = aircraft_data(rotors=[{}, {}])
+    data["controls"]["stabilator"] = STABILATOR
+    data["body"] |= surface(incidence_deg=2.0, max_lift=2.0, mixing={"incidence": {"stabilator": 0.5}}, **changes)
+    return Aircraft.from_dict(data)
+
+
+def test_a_control_sets_the_incidence_as_the_file_would():
+    """Half of 8 deg more than the file has; loads, trims and linear models follow, and no rotor feels it."""
+    aircraft = with_stabilator()
+    controls = aircraft.held_controls.copy()
+    controls[-1] = math.radians(8.0)
+    rows = aircraft.mix(controls)
+    assert [row.owner for row in aircraft.rows] == ["R1", "R2", "plate"]
+    np.testing.assert_allclose(rows[2], [math.radians(4.0), 0.0, 0.0], rtol=1e-15)
+    moved, there = Model(aircraft), Model(build(body=surface(incidence_deg=6.0, max_lift=2.0), rotors=[{}, {}]))
+    x = moved.state((25.0, 1.0, 2.0), (0.1, 0.2, 0.3), 0.05)
+    np.testing.assert_allclose(moved.derivative(x, rows), there.derivative(x, rows[:2]), rtol=1e-10, atol=1e-9)
+    held = aircraft.with_value("controls.stabilator.held_deg", 8.0)
+    point, same = trim(held, 15.0), trim(there.aircraft, 15.0)
+    np.testing.assert_allclose(point.controls[:4], same.controls, atol=1e-8)
+    b = linearize(held, point=point).b[:, -1]
+    assert b[2] < -0.1  # leading edge up behind the c.g.: nose down
+
+
+def test_an_aircraft_with_a_stabilator_flies_by_every_method_and_its_actuator_has_a_rate():
+    aircraft = with_stabilator(incidence_rate_deg=10.0, incidence_range_deg=[-3.0, 3.0])
+    point = trim(aircraft, 15.0)
+    step = point.controls + [0.0, 0.0, 0.0, 0.0, math.radians(10.0)]
+    flights = [simulate(aircraft, point, step, 0.3, method=name, actuators=True) for name in ("etd", "rk4")]
+    np.testing.assert_allclose(flights[0]["q"], flights[1]["q"], atol=1e-5)
+    assert flights[0]["q"][-1] < -0.01
+    angles = np.degrees(flights[0]["swashplate"][:, 2, 0])
+    np.testing.assert_allclose(np.diff(angles[1:]), 0.1, atol=1e-12)
+    assert "clipped: plate incidence at its limit of 3 deg" in flights[0].warnings
+    mixer = Mixer(aircraft)
+    mixer.set_target(point.controls)
+    np.testing.assert_array_equal(mixer.move(0.0), aircraft.mix(point.controls))
 
 
 def test_the_wash_of_a_hovering_rotor_presses_the_tailplane_down():

@@ -1,4 +1,4 @@
-"""Aircraft of every kind with every key: a sample of tools/robustness/generality.py, one of each kind or two."""
+"""Aircraft of every kind with every key: a sample of tools/robustness/generality.py."""
 
 import functools
 
@@ -11,14 +11,10 @@ from sbs_sim import linearize, trim
 from sbs_sim.analysis.modes import Mode
 from sbs_sim.errors import TrimError
 
-SEED = 1
-NUMBERS = range(2 * len(ALL_KINDS))
+SEED = 6  # of which ten aircraft have all keys
+NUMBERS = range(10)
 
-WITHOUT_TRIM = {
-    1: "^no trim: the rotors cannot carry more than .* of the weight",
-    5: "^no trim: no control sets the yawing moment",
-    6: "^no trim: the rotors cannot carry more than .* of the weight, where main stalls",
-}
+WITHOUT_TRIM = {5: "^no trim: no control sets the yawing moment"}
 
 
 @functools.cache
@@ -39,9 +35,18 @@ def test_the_sample_has_every_key():
     """Otherwise it shows less than it says."""
     texts = [str(dict(sample(number)[1].data)) for number in NUMBERS]
     for key in (
-        *("stations", "blade_inertia", "flap_rest_deg", "lag_rest_deg", "lag_damper", "blade_lag_damping", "wash"),
+        *("stations", "blade_inertia", "flap_rest_deg", "lag_rest_deg", "lag_damper", "blade_lag_damping", "'wash'"),
         *("surfaces", "schedule", "polar", "fuselage", "grid", "altitude", "sc1095r8", "held_deg", "drives"),
-        *("'electric'", "'engine'", "governor", "free_wheel", "stand", "swashplate_offset_deg"),
+        *(
+            "'electric'",
+            "'engine'",
+            "governor",
+            "free_wheel",
+            "stand",
+            "swashplate_offset_deg",
+            "lip_arm",
+            "induced_power_factor",
+        ),
     ):
         assert any(key in text for text in texts), key
     blades = {rotor.blades for number in NUMBERS for rotor in sample(number)[1].rotors}

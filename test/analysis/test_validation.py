@@ -184,7 +184,7 @@ def test_trims_and_rate_matrices_of_the_genhel_class_are_those_of_a_helicopter(r
     assert trims["pitch attitude"][8] < 0.0 < trims["pitch attitude"][0]
     for damping in ("X_u", "Z_w", "M_q", "L'_p", "N'_r", "Y_v"):
         assert max(rates[damping]) < 0.0, damping
-    entry = report.to_dict()["cases"][-1]
+    entry = next(case for case in report.to_dict()["cases"] if case["name"] == "uh60a_genhel")
     assert entry["tables"][1]["rows"][0] == {"quantity": "X_u", "unit": "1/s", "values": list(rates["X_u"])}
 
 

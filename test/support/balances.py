@@ -8,7 +8,17 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
-from plain_model import cross, damper_moments, duct_force, energy, first_moment, make_instant, momentum, rotation_matrix
+from plain_model import (
+    cross,
+    damper_moments,
+    duct_load,
+    energy,
+    first_moment,
+    make_instant,
+    met_velocity,
+    momentum,
+    rotation_matrix,
+)
 
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
@@ -116,12 +126,14 @@ def balance(model, x, swash, psi0, wind=(0.0, 0.0, 0.0)):
     body, drag, flow, dampers = force @ state.velocity + moment @ state.rate, 0.0, 0.0, 0.0
     for j, rotor in enumerate(plain.rotors):
         hub_velocity = state.velocity + cross(state.rate, rotor.hub)
-        duct = duct_force(instant, j)
-        body += duct @ hub_velocity
-        force, moment = force + duct, moment + cross(rotor.hub, duct)
+        # the air behind the lip of a duct goes with it
+        carried = air + instant.hub_velocities[j] - met_velocity(rotor, instant.hub_velocities[j])
+        duct, duct_moment = duct_load(instant, j)
+        body += duct @ state.velocity + duct_moment @ state.rate
+        force, moment = force + duct, moment + duct_moment
         for k, blade in enumerate(instant.blades[j]):
             for s, load in instant.air_loads[j][k]:
-                gained = air - induced_velocity(rotor, blade, s, state.inflow[j])
+                gained = carried - induced_velocity(rotor, blade, s, state.inflow[j])
                 # lift is normal to the section's velocity relative to the air
                 drag -= load @ (blade.velocity(s, hub_velocity) - gained)
                 flow -= load @ gained
@@ -142,7 +154,8 @@ def induced_velocity(rotor, blade, s, inflow):
     lambda0, lambdas, lambdac = inflow
     cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
     share = (rotor.hinge_offset + s) / rotor.radius
-    return rotor.inflow_speed * rotor.radius * (lambda0 + share * cyclic) * np.cos(blade.flap) * blade.n
+    speed = rotor.induced_power_factor * rotor.inflow_speed
+    return speed * rotor.radius * (lambda0 + share * cyclic) * np.cos(blade.flap) * blade.n
 
 
 def damping_power(instant, j, k):

@@ -116,6 +116,8 @@ def fuselage_load(ac, fuselage, local):
     """Return force [N] and moment about the reference point [N m] of a fuselage."""
     u, v, w = local
     alpha, beta = np.degrees(np.arctan2(w, u)), np.degrees(np.arctan2(v, np.hypot(u, w)))
+    if not local.any():  # no flow has no direction, and no load
+        return np.zeros(3), np.zeros(3)
     ahead = local / np.linalg.norm(local)
     down = np.array([-w, 0.0, u]) / np.hypot(u, w)
     right = np.cross(down, ahead)

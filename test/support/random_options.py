@@ -170,6 +170,11 @@ def _vary_rotor(rotor: dict[str, Any], rng: np.random.Generator) -> None:
     if rng.random() < 0.25:
         rotor["airfoil"] = "sc1095r8"
     if rng.random() < 0.25:
+        rotor["induced_power_factor"] = float(rng.uniform(1.0, 1.2))
+    if rng.random() < 0.15:
+        duct = {"exit_area": 0.7, "turning": 0.8, "ram_recovery": 0.9, "lip_arm": 0.1 * radius, "lip_stall": 2.0}
+        rotor |= {"duct": duct, "duct_expansion": 0.5}
+    if rng.random() < 0.25:
         rotor["pitch_lag_coupling"] = float(rng.uniform(-0.1, 0.1))
 
 

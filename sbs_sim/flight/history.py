@@ -3,7 +3,6 @@
 from __future__ import annotations  # `help` then shows types by their names
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +44,8 @@ def history(
     aircraft: Aircraft, snapshots: Sequence[Snapshot], given: Sequence[Array], warnings: Iterable[str] = ()
 ) -> History:
     """History, see `simulate`, of snapshots and as many pilot controls, each (n_controls,), with more warnings."""
-    rows = Rows(**{field.name: np.array([getattr(one, field.name) for one in snapshots]) for field in fields(Rows)})
-    working = np.array([one.working for one in snapshots if one.working is not None])
+    rows = Rows.of(snapshots)
+    working = np.empty(0) if rows.working is None else rows.working
     lines = (*flight_warnings(aircraft, working), *warnings)
     return History(named_histories(aircraft, [(rows, np.array(given))], True), lines)
 

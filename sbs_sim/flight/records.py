@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,36 +13,38 @@ from sbs_sim.content import ByContent
 from sbs_sim.model.wind import Wind
 
 Array = NDArray[np.float64]
+Step = TypeVar("Step", int, NDArray[np.int64])
+Time = TypeVar("Time", float, Array)
 
 
 @dataclass(frozen=True, eq=False)
-class Snapshot(ByContent):
-    """State and loads of a flight at one instant.
+class Instants(ByContent, Generic[Step, Time]):
+    """State and loads of a flight at one instant (`Snapshot`) or at n instants (`Rows`).
 
     Attributes
     ----------
-    step : int
+    step : int, or ndarray of int64 of shape (n,)
         Number of the integration step.
-    time : float
+    time : float, or ndarray of shape (n,)
         Simulation time [s].
-    state : ndarray, shape (size,)
+    state : ndarray, shape (size,) or (n, size)
         Simulation state, see `sbs_sim.model.state`.
-    acceleration : ndarray, shape (3,)
+    acceleration : ndarray, shape (3,) or (n, 3)
         Inertial acceleration of the c.g. in body axes [m/s^2].
-    swashplate : ndarray, shape (n_rows, 3)
+    swashplate : ndarray, shape (n_rows, 3) or (n, n_rows, 3)
         Angles in force [rad].
-    azimuth : ndarray, shape (n_rotors,)
+    azimuth : ndarray, shape (n_rotors,) or (n, n_rotors)
         [rad], 0 to 2 pi.
-    loads : ndarray, shape (n_rotors, LOAD_SIZE)
+    loads : ndarray, shape (n_rotors, LOAD_SIZE) or (n, n_rotors, LOAD_SIZE)
         Thrust, torque, hub force and moment, see `sbs_sim.model.records`.
-    wind : ndarray, shape (3,)
+    wind : ndarray, shape (3,) or (n, 3)
         Velocity of the air, NED [m/s].
-    working : ndarray, shape (n_rotors, WORKING_SIZE), or None
-        Working states of the rotors, see `sbs_sim.model.working_state`; None where nobody knows them.
+    working : ndarray, shape (n_rotors, WORKING_SIZE) or (n, n_rotors, WORKING_SIZE), or None
+        Working states of the rotors, see `sbs_sim.model.working_state`; None where they are not known.
     """
 
-    step: int
-    time: float
+    step: Step
+    time: Time
     state: Array
     acceleration: Array
     swashplate: Array
@@ -50,28 +54,29 @@ class Snapshot(ByContent):
     working: Array | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Rows(ByContent):
-    """Instants of a flight one below the other: what `Snapshot` tells, with one more axis in front of each.
+class Snapshot(Instants[int, float]):
+    """One instant of a flight."""
 
-    Attributes
-    ----------
-    step, time, state, acceleration, swashplate, azimuth, loads, wind : ndarray
-        See `Snapshot`; acceleration and loads are zero where they were not asked for.
-    """
 
-    step: NDArray[np.int64]
-    time: Array
-    state: Array
-    acceleration: Array
-    swashplate: Array
-    azimuth: Array
-    loads: Array
-    wind: Array
+class Rows(Instants[NDArray[np.int64], Array]):
+    """Instants of a flight in order. Acceleration and loads are zero where they were not asked for."""
+
+    @classmethod
+    def of(cls, snapshots: Sequence[Snapshot]) -> Rows:
+        """Rows of snapshots, of which all or none have working states."""
+        columns = ([getattr(one, part.name) for one in snapshots] for part in fields(cls))
+        return cls(*(_column(values) for values in columns))
 
     def first(self, count: int) -> Rows:
         """The first instants."""
-        return Rows(*(getattr(self, part.name)[:count] for part in fields(self)))
+        columns: list[Any] = [getattr(self, part.name) for part in fields(self)]
+        parts: list[Any] = [None if column is None else column[:count] for column in columns]
+        return Rows(*parts)
+
+
+def _column(values: list[Any]) -> Any:
+    """Values of instants as one array; None where they are not known."""
+    return None if any(value is None for value in values) else np.array(values)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import itertools
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -19,13 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.trim import trim
+from sbs_sim.analysis.trim import solve_trim, trim
 from sbs_sim.concurrency.parallel import checked_workers, compute
 from sbs_sim.content import ByContent
 from sbs_sim.errors import BatchError, SbsError
 from sbs_sim.flight.controls import Commands
 from sbs_sim.flight.sortie import Sortie, fly_together, structure
-from sbs_sim.flight.trim_point import TrimPoint
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_angles
 from sbs_sim.model.packing import lane_count
@@ -35,11 +35,12 @@ if TYPE_CHECKING:
     import distributed
 
 Array = NDArray[np.float64]
+Start = TrimPoint | ArrayLike | TrimCondition | Mapping[str, Any]
 Result = tuple[dict[str, Array], str | None, tuple[str, ...]]  # histories, error, warnings of a flight
 
 LOADED = ("acceleration", "thrust", "torque", "power")  # which take a derivative at every row
 GROUPS = ("state", "controls", "swashplate", *LOADED)
-FIDELITY = ("lead_lag", "cyclic_inflow")
+OPTIONS = ("tick", "azimuth_step", "method", "ground_altitude", "actuators")
 TRIM_ARGUMENTS = tuple(list(inspect.signature(trim).parameters)[1:])  # but the aircraft
 CANCELLED = "cancelled"
 MEMORY = 4e9  # bytes
@@ -53,9 +54,9 @@ class Case(ByContent):
     Parameters
     ----------
     aircraft : Aircraft
-    start : TrimPoint, ndarray of shape (size,), or mapping
-        See `sbs_sim.simulate`; a mapping holds arguments of `sbs_sim.trim`, {"airspeed": 15.0}, with which the
-        aircraft of this flight is trimmed.
+    start : TrimPoint, ndarray of shape (size,), TrimCondition or mapping
+        See `sbs_sim.simulate`. In a TrimCondition the aircraft of this flight is trimmed, with the fidelity of the
+        batch; a mapping holds arguments of `sbs_sim.trim`, {"airspeed": 15.0}.
     controls : array_like or callable, optional
         See `sbs_sim.simulate`; those of the trim if not given.
     wind : Wind
@@ -65,7 +66,7 @@ class Case(ByContent):
     """
 
     aircraft: Aircraft
-    start: TrimPoint | ArrayLike | Mapping[str, float]
+    start: Start
     controls: Commands | None = None
     wind: Wind = field(default_factory=Wind)
     changes: Mapping[str, Any] = field(default_factory=dict)
@@ -143,6 +144,7 @@ class Plan:
     """What all flights of a batch have in common."""
 
     duration: float
+    fidelity: Fidelity
     every: int
     outputs: tuple[str, ...]
     options: dict[str, Any]
@@ -154,7 +156,9 @@ def simulate_batch(
     *,
     every: int = 1,
     outputs: Sequence[str] = GROUPS,
-    tick: float = 0.01,
+    lead_lag: bool = True,
+    cyclic_inflow: bool = True,
+    azimuth_count: int = 12,
     workers: int | None = None,
     progress: Callable[[int, int, int], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
@@ -177,8 +181,8 @@ def simulate_batch(
         (..., n_rotors, 3), "acceleration" (..., 3), "thrust", "torque", "power" (..., n_rotors), and of single states
         by their names (n_flights, n_rows). The four loads and accelerations take a derivative for every row. Aircraft
         with fewer rotors or other states have NaN in their places.
-    tick, **options
-        See `sbs_sim.simulate`: azimuth_step, lead_lag, cyclic_inflow, method, ground_altitude, actuators.
+    lead_lag, cyclic_inflow, azimuth_count :
+        Fidelity of the flights, and of the trims from which they start; see `sbs_sim.trim`.
     workers : int, optional
         Number of threads, one for each core if not given. The results are the same for any number.
     progress : callable, optional
@@ -190,6 +194,8 @@ def simulate_batch(
         See `sbs_sim.sweep`.
     memory : float
         What the histories may take [bytes]. They are all that grows with the number of flights.
+    **options
+        tick, azimuth_step, method, ground_altitude, actuators: see `sbs_sim.simulate`.
 
     Returns
     -------
@@ -200,10 +206,43 @@ def simulate_batch(
     ------
     BatchError
         No flights, an unknown output, a value that is out of range, histories that need more memory: naming it.
+    TrimError
+        Fidelity out of range.
     ClusterError
         See `sbs_sim.sweep`.
     """
-    plan = _plan(cases, duration, every, outputs, {"tick": tick, **options})
+    fidelity = Fidelity(lead_lag, cyclic_inflow, azimuth_count)
+    return simulate_cases(
+        cases,
+        duration,
+        fidelity,
+        every=every,
+        outputs=outputs,
+        workers=workers,
+        progress=progress,
+        cancelled=cancelled,
+        dask=dask,
+        memory=memory,
+        **options,
+    )
+
+
+def simulate_cases(
+    cases: Sequence[Case],
+    duration: float,
+    fidelity: Fidelity,
+    *,
+    every: int = 1,
+    outputs: Sequence[str] = GROUPS,
+    workers: int | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    dask: str | distributed.Client | None = None,
+    memory: float = MEMORY,
+    **options: Any,
+) -> Batch:
+    """Fly many flights at once; see `simulate_batch`."""
+    plan = _plan(cases, duration, fidelity, every, outputs, options)
     count = checked_workers(workers, dask, BatchError)
     rows = round(plan.duration / plan.options["tick"]) // plan.every + 1
     names = tuple(dict.fromkeys(name for case in cases for name in case.aircraft.layout.names))
@@ -231,22 +270,29 @@ def simulate_batch(
     return Batch(tuple(cases), time, names, histories, tuple(errors), tuple(warnings))
 
 
-def _plan(cases: Sequence[Case], duration: float, every: int, outputs: Sequence[str], options: dict[str, Any]) -> Plan:
+def _plan(
+    cases: Sequence[Case],
+    duration: float,
+    fidelity: Fidelity,
+    every: int,
+    outputs: Sequence[str],
+    options: dict[str, Any],
+) -> Plan:
     """What the flights have in common, checked as far as it can be without an aircraft."""
     _check_cases(cases)
     duration = checks.number("duration", duration, 0.0, 1e6, "s", BatchError)
-    options["tick"] = checks.number("tick", options["tick"], 1e-4, 1.0, "s", BatchError)
+    checks.instance("fidelity", fidelity, Fidelity, BatchError)
+    options["tick"] = checks.number("tick", options.get("tick", 0.01), 1e-4, 1.0, "s", BatchError)
     every = checks.integer("every", every, 1, MAX_TICKS, BatchError)
-    allowed = ("tick", "azimuth_step", "method", "ground_altitude", "actuators", *FIDELITY)
-    unknown = [name for name in options if name not in allowed]
+    unknown = [name for name in options if name not in OPTIONS]
     if unknown:
-        raise BatchError(f"{unknown[0]}: unknown option, allowed are {', '.join(allowed)}")
+        raise BatchError(f"{unknown[0]}: unknown option, allowed are {', '.join((*OPTIONS, *asdict(fidelity)))}")
     known = {*GROUPS, *(name for case in cases for name in case.aircraft.layout.names)}
     checks.instance("outputs", outputs, Sequence, BatchError)
     for name in outputs:
         if not (isinstance(name, str) and name in known):
             raise BatchError(f"outputs: {checks.shown(name)}: allowed are {', '.join(GROUPS)} and names of states")
-    return Plan(duration, every, tuple(dict.fromkeys(outputs)), options)
+    return Plan(duration, fidelity, every, tuple(dict.fromkeys(outputs)), options)
 
 
 def _check_cases(cases: Any) -> None:
@@ -341,7 +387,7 @@ def _side_by_side(sorties: Mapping[int, Sortie]) -> Iterator[list[int]]:
 
 def _sortie(
     aircraft: Aircraft,
-    start: TrimPoint | ArrayLike | Mapping[str, float],
+    start: Start,
     controls: Commands | None,
     wind: Wind,
     changes: dict[str, Any],
@@ -359,18 +405,31 @@ def _sortie(
         aircraft = aircraft.with_values(changes)
     if aircraft.layout != layout:
         raise BatchError(f"changes = {changes}: allowed are those that leave the states as they are")
-    if isinstance(start, Mapping):
+    fidelity = plan.fidelity
+    if isinstance(start, TrimCondition):
+        start = solve_trim(aircraft, start, fidelity)
+    elif isinstance(start, Mapping):
         if unknown := [name for name in start if name not in TRIM_ARGUMENTS]:
             name = checks.shown(unknown[0])
             raise BatchError(f"start: {name}: unknown, allowed are {', '.join(TRIM_ARGUMENTS)}")
-        fidelity = {name: plan.options[name] for name in FIDELITY if name in plan.options}
-        start = trim(aircraft, **{**fidelity, **start})
+        start = trim(aircraft, **{**asdict(fidelity), **start})
     if controls is None:
         if not isinstance(start, TrimPoint):
             raise BatchError("controls: needed where the start is a state")
         controls = start.controls
     loaded = any(name in LOADED for name in plan.outputs)
-    return Sortie(aircraft, start, controls, plan.duration, every=plan.every, loaded=loaded, wind=wind, **plan.options)
+    return Sortie(
+        aircraft,
+        start,
+        controls,
+        plan.duration,
+        every=plan.every,
+        loaded=loaded,
+        wind=wind,
+        lead_lag=fidelity.lead_lag,
+        cyclic_inflow=fidelity.cyclic_inflow,
+        **plan.options,
+    )
 
 
 def _result(sortie: Sortie, plan: Plan) -> Result:

@@ -4,6 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.paths import unit_of
 from sbs_sim.analysis.batch import Batch, Case, percentiles
 from sbs_sim.errors import BatchError
-from sbs_sim.flight.trim_point import LIMITS
+from sbs_sim.flight.trim_point import LIMITS, TrimCondition
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.model.noise import normal
@@ -31,7 +32,7 @@ MIN_AIRSPEED = 5.0  # m/s, at which the field passes in hover
 def gust_cases(
     aircraft: Aircraft,
     flights: int,
-    condition: Mapping[str, float],
+    condition: TrimCondition | Mapping[str, Any],
     *,
     turbulence: float,
     length: float = 50.0,
@@ -44,8 +45,8 @@ def gust_cases(
     ----------
     aircraft : Aircraft
     flights : int
-    condition : mapping
-        Arguments of `sbs_sim.trim`, with which each flight's aircraft is trimmed.
+    condition : TrimCondition or mapping
+        In which each flight's aircraft is trimmed; a mapping holds arguments of `sbs_sim.trim`, see `Case`.
     turbulence : float
         Standard deviation of each component [m/s].
     length : float
@@ -68,14 +69,16 @@ def gust_cases(
         A path that does not exist, or turbulence out of range.
     """
     checks.instance("aircraft", aircraft, Aircraft, BatchError)
-    checks.instance("condition", condition, Mapping, BatchError)
+    if not isinstance(condition, TrimCondition):
+        checks.instance("condition", condition, Mapping, BatchError)
     flights = checks.integer("flights", flights, 1, MAX_FLIGHTS, BatchError)
     seed = checks.integer("seed", seed, 0, 2**64 - 1, BatchError)
     spread = {} if spread is None else spread
     checks.instance("spread", spread, Mapping, BatchError)
     centres = {path: (_centre(aircraft, path), _checked_share(path, share)) for path, share in spread.items()}
+    given = asdict(condition) if isinstance(condition, TrimCondition) else dict(condition)
     most, unit = LIMITS["airspeed"]
-    airspeed = checks.number("airspeed", condition.get("airspeed", 0.0), -most, most, unit, BatchError)
+    airspeed = checks.number("airspeed", given.get("airspeed", 0.0), -most, most, unit, BatchError)
     cases = []
     for i in range(flights):
         source = np.random.PCG64(np.random.SeedSequence([seed, i]))
@@ -83,13 +86,14 @@ def gust_cases(
             turbulence_intensity=(turbulence, turbulence, turbulence),
             turbulence_length=length,
             turbulence_airspeed=max(abs(airspeed), MIN_AIRSPEED),
-            turbulence_direction=condition.get("sideslip", 0.0),
+            turbulence_direction=given.get("sideslip", 0.0),
             turbulence_seed=source.random_raw() >> 1,
         )
         numbers = normal(source, -(-len(centres) // 2)).ravel().tolist()
         scattered = zip(centres.items(), numbers, strict=False)
         changes = {path: mean * (1.0 + share * number) for (path, (mean, share)), number in scattered}
-        cases.append(Case(aircraft, dict(condition), wind=wind, changes=changes))
+        start = condition if isinstance(condition, TrimCondition) else given
+        cases.append(Case(aircraft, start, wind=wind, changes=changes))
     return cases
 
 

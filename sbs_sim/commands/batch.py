@@ -2,7 +2,6 @@
 
 import argparse
 from collections import Counter
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from sbs_sim.commands.common import (
@@ -73,7 +72,7 @@ def make_parser() -> Parser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.analysis.batch import simulate_batch
+    from sbs_sim.analysis.batch import simulate_cases
     from sbs_sim.analysis.monte_carlo import OUTPUTS, batch_to_csv, batch_to_dict, gust_cases
     from sbs_sim.output.files import check_target, write
     from sbs_sim.output.json_text import to_json
@@ -86,23 +85,22 @@ def _work(arguments: argparse.Namespace) -> None:
     cases = gust_cases(
         aircraft(arguments),
         arguments.flights,
-        {**asdict(condition), "azimuth_count": fidelity.azimuth_count},
+        condition,
         turbulence=arguments.turbulence,
         length=arguments.length,
         seed=arguments.seed,
         spread=dict(arguments.spread),
     )
     with progress_bar(" flights", len(cases)) as progress:
-        batch = simulate_batch(
+        batch = simulate_cases(
             cases,
             arguments.duration,
+            fidelity,
             every=round(100 * arguments.every),
             outputs=OUTPUTS,
             workers=arguments.workers,
             dask=arguments.dask,
             progress=progress,
-            lead_lag=fidelity.lead_lag,
-            cyclic_inflow=fidelity.cyclic_inflow,
         )
     _print_batch(batch)
     if arguments.csv:

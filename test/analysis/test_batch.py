@@ -10,8 +10,9 @@ import pytest
 from helpers import build
 
 from sbs_sim import Aircraft, Case, simulate, simulate_batch, trim
-from sbs_sim.analysis.batch import CANCELLED, GROUPS
+from sbs_sim.analysis.batch import CANCELLED, GROUPS, simulate_cases
 from sbs_sim.errors import BatchError, SimulationError
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition
 from sbs_sim.model.state import ATTITUDE
 from sbs_sim.model.wind import Wind
 
@@ -128,6 +129,22 @@ def test_changes_and_trims_are_made_for_each_flight(sbs):
     assert_same(batch, 0, simulate(variant, point, point.controls, DURATION, wind=gusts(7), lead_lag=False), 1)
 
 
+def test_conditions_are_trimmed_with_the_fidelity_of_the_batch(sbs):
+    """A condition as an object gives the bits of its arguments, and averages over as many azimuths."""
+    arguments, condition = {"airspeed": 9.0, "sideslip": 0.1}, TrimCondition(airspeed=9.0, sideslip=0.1)
+    few, standard = Fidelity(azimuth_count=3), Fidelity()
+    each = [
+        simulate_cases([Case(sbs, start)], 0.02, fidelity, outputs=["state"])["state"].tobytes()
+        for fidelity in (few, standard)
+        for start in (arguments, condition)
+    ]
+    assert (each[0], each[2]) == (each[1], each[3])
+    assert each[0] != each[2]
+    assert (
+        each[0] == simulate_batch([Case(sbs, arguments)], 0.02, azimuth_count=3, outputs=["state"])["state"].tobytes()
+    )
+
+
 def test_only_what_was_asked_for_is_kept(cases):
     batch = simulate_batch(cases[:2], DURATION, outputs=["w", "power"], every=10)
     assert set(batch.histories) == {"w", "power"}
@@ -183,7 +200,7 @@ def test_a_flight_that_fails_ends_with_its_reason_and_disturbs_no_other(sbs, cas
         (
             {"speed": 1},
             "speed: unknown option, allowed are tick, azimuth_step, method, ground_altitude, actuators, lead_lag,"
-            " cyclic_inflow",
+            " cyclic_inflow, azimuth_count",
         ),
         ({"workers": 2, "dask": "x"}, "workers = 2: not allowed with dask, whose workers are those of the cluster"),
         ({"duration": 1e6}, "the histories of 1 flights with 100000001 rows take "),

@@ -13,6 +13,7 @@ from sbs_sim import Case, simulate, simulate_batch
 from sbs_sim.analysis.monte_carlo import OUTPUTS, SHARES, batch_to_csv, batch_to_dict, gust_cases, quantities
 from sbs_sim.analysis.monte_carlo_plots import SHOWN, batch_figure
 from sbs_sim.errors import AircraftError, BatchError, SimulationError
+from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.state import ATTITUDE
@@ -64,6 +65,9 @@ def test_the_command_tells_in_how_many_flights_the_model_does_not_hold(tmp_path)
 def test_the_field_passes_with_the_airspeed_and_never_stands(sbs):
     fast, hovering = (gust_cases(sbs, 1, {"airspeed": speed}, turbulence=1.0)[0].wind for speed in (-12.0, 0.0))
     assert (fast.turbulence_airspeed, hovering.turbulence_airspeed) == (12.0, 5.0)
+    (case,) = gust_cases(sbs, 1, TrimCondition(airspeed=-12.0, sideslip=0.5), turbulence=1.0)
+    assert (case.wind.turbulence_airspeed, case.wind.turbulence_direction) == (12.0, 0.5)
+    assert case.start == TrimCondition(airspeed=-12.0, sideslip=0.5)
 
 
 @pytest.mark.parametrize(

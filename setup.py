@@ -3,6 +3,7 @@
 import shutil
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
@@ -72,7 +73,7 @@ def own_folder():
 
 setup(
     name=PACKAGE,
-    version="0.2.0",
+    version=ElementTree.parse("package.xml").findtext("version"),
     description="Flight simulator of a side-by-side helicopter on ROS 2",
     maintainer="sbs_sim maintainers",
     maintainer_email="sbs_sim@example.org",

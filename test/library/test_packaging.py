@@ -9,13 +9,16 @@ import sysconfig
 import venv
 import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from packaging.requirements import Requirement
 
+import sbs_sim
 from sbs_sim import trim
 
 ROOT = Path(__file__).resolve().parents[2]
+VERSION = ElementTree.parse(ROOT / "package.xml").findtext("version")
 PATIENCE = 120.0  # s, generous, for machines that are busy
 
 
@@ -84,7 +87,7 @@ def call(environment, *words, **more):
 
 def test_one_command_gets_into_the_path(environment):
     assert environment[1] == {"sbs-sim"}
-    assert call(environment, "sbs-sim", "--version").stdout == "sbs_sim 0.2.0\n"
+    assert call(environment, "sbs-sim", "--version").stdout == f"sbs_sim {VERSION}\n"
 
 
 def test_it_trims_where_nothing_else_is(environment, sbs, tmp_path):
@@ -132,14 +135,9 @@ def test_a_refusal_is_one_line_there_too(environment):
     assert result.stderr == f"aircraft = 'nothing': allowed are a file's path or one of {shipped}\n"
 
 
-def test_every_file_names_the_same_version():
-    text = {
-        name: (ROOT / name).read_text() for name in ("setup.py", "package.xml", "msg_defs/package.xml", "CITATION.cff")
-    }
-    (version,) = re.findall(r'^    version="([\d.]+)"', text["setup.py"], re.MULTILINE)
-    assert re.findall(r"<version>(.*)</version>", text["package.xml"]) == [version]
-    assert re.findall(r"<version>(.*)</version>", text["msg_defs/package.xml"]) == [version]
-    assert re.findall(r"^version: (.*)$", text["CITATION.cff"], re.MULTILINE) == [version]
-    assert re.search(
-        rf"^## {re.escape(version)} - \d{{4}}-\d\d-\d\d$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE
-    )
+def test_every_file_names_the_version_of_the_ros_package():
+    text = {name: (ROOT / name).read_text() for name in ("msg_defs/package.xml", "CITATION.cff", "CHANGELOG.md")}
+    assert re.findall(r"<version>(.*)</version>", text["msg_defs/package.xml"]) == [VERSION]
+    assert re.findall(r"^version: (.*)$", text["CITATION.cff"], re.MULTILINE) == [VERSION]
+    assert re.search(r"^## (\S+) - \d{4}-\d\d-\d\d$", text["CHANGELOG.md"], re.MULTILINE)[1] == VERSION
+    assert sbs_sim.__version__ == VERSION

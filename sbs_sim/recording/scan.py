@@ -15,11 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    Channel,
-    Schema,
-)
+from mcap.records import Attachment, Channel, Schema
 
 from sbs_sim.errors import RecordingError
 from sbs_sim.recording.checked_records import (
@@ -36,10 +32,7 @@ from sbs_sim.recording.checked_records import (
     loose_records_at,
 )
 from sbs_sim.recording.checksum_policy import OTHER_RECORDS, OptionalChecksums, has_own_checksum, open_recording
-from sbs_sim.recording.mcap_file import (
-    MAGIC,
-    ROSBAG2,
-)
+from sbs_sim.recording.mcap_file import MAGIC, ROSBAG2
 from sbs_sim.recording.source import DamageError, Source
 from sbs_sim.recording.summary import Summary
 

@@ -7,9 +7,7 @@ from pathlib import Path
 from types import TracebackType
 
 from sbs_sim.errors import RecordingError
-from sbs_sim.recording.mcap_file import (
-    reason,
-)
+from sbs_sim.recording.mcap_file import reason
 from sbs_sim.recording.other_formats import describe_file, describe_folder
 
 BLOCK = 1 << 20

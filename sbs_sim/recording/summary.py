@@ -5,21 +5,11 @@ import zlib
 from dataclasses import dataclass, field
 
 from mcap.opcode import Opcode
-from mcap.records import (
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    Footer,
-    MetadataIndex,
-    Schema,
-    Statistics,
-)
+from mcap.records import AttachmentIndex, Channel, ChunkIndex, Footer, MetadataIndex, Schema, Statistics
 from mcap.stream_reader import StreamReader
 
 from sbs_sim.recording.checked_records import PARSE_ERRORS, RECORD_HEAD, Extent, read_record
-from sbs_sim.recording.mcap_file import (
-    MAGIC,
-)
+from sbs_sim.recording.mcap_file import MAGIC
 from sbs_sim.recording.source import DamageError, Source
 
 FOOTER_SIZE = RECORD_HEAD.size + 20

@@ -1,9 +1,10 @@
-"""A pilot for the tools that need a flight to last: holds hover at a place by linear-quadratic state feedback.
+"""A pilot for the tools that need a flight to last: holds hover at a position by linear-quadratic state feedback.
 
     ./run python tools/hover_controller.py [--rate 50] [--name pilot]
 
-The model is `sbs_sim.linearize`, rotors and inflow settled, with place and heading added; the weights are Bryson's: one
-over the square of what each state and control may depart by (A. E. Bryson, Y.-C. Ho: Applied Optimal Control, 1975).
+The model is `sbs_sim.linearize`, rotors and inflow settled, with position and heading added. The weights are Bryson's:
+one over the square of the departure allowed to each state and control (A. E. Bryson, Y.-C. Ho: Applied Optimal Control,
+1975).
 """
 
 import argparse
@@ -25,20 +26,20 @@ MAX_GAP = 3.0  # m that it hurries for
 
 
 class HoverLaw:
-    """Controls that hold hover at a place, heading north.
+    """Controls that hold hover at a position, heading north.
 
     Parameters
     ----------
     aircraft : Aircraft
-    place : array_like, shape (3,)
+    position : array_like, shape (3,)
         NED [m].
     """
 
-    def __init__(self, aircraft: Aircraft, place: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
+    def __init__(self, aircraft: Aircraft, position: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
         model = linearize(aircraft).quasi_static(BODY)
         trim = model.trim
         self.trim = trim.controls
-        self._place = np.array(place)
+        self._position = np.array(position)
         self._pitch, self._roll = trim.pitch, trim.roll
         self._low, self._high = np.array(list(aircraft.control_ranges.values())).T
         a = np.zeros((12, 12))
@@ -62,7 +63,7 @@ class HoverLaw:
             Body axes [m/s, rad/s].
         """
         heading, pitch, roll = euler
-        gap = np.clip(position - self._place, -MAX_GAP, MAX_GAP)
+        gap = np.clip(position - self._position, -MAX_GAP, MAX_GAP)
         c, s = math.cos(heading), math.sin(heading)
         ahead, right = c * gap[0] + s * gap[1], c * gap[1] - s * gap[0]
         u, v, w = velocity

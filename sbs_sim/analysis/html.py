@@ -114,7 +114,7 @@ def cell(tag: str, text: str, name: str = "", more: str = "", to_html: Callable[
 def plain_table(
     title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], to_html: Callable[[str], str] = text_of
 ) -> str:
-    """Table of texts; columns of numbers stand at the right."""
+    """Table of texts; columns of numbers are aligned to the right."""
     right = {i for i, value in enumerate(rows[-1]) if re.fullmatch(r"-?[\d.]+\*?", value)}
     body = "\n".join(
         "<tr>"

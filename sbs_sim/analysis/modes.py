@@ -1,6 +1,6 @@
 """Modes of a linear model: poles, participation, names (theory.md section 9).
 
-A mode is named by what takes part in it, never by its place in a list. The participation of state k in mode i is
+A mode is named by what takes part in it, never by its index. The participation of state k in mode i is
 p_ki = |V_ki W_ik| with the right eigenvectors in the columns of V and W = inv(V), normalised to a sum of one: it does
 not depend on the units of the states, nor on their order (Perez-Arriaga, Verghese, Schweppe, Selective modal analysis,
 IEEE Trans. PAS 101, 1982).
@@ -243,13 +243,13 @@ class _Found:
         self.participation = np.array([mode.participation for mode in modes])
         self.rows: list[list[float]] = self.participation.tolist()
 
-    def sums(self, places: Indices) -> list[float]:
+    def sums(self, indices: Indices) -> list[float]:
         """Share of some states in every mode."""
-        return self.participation.take(places, axis=1).sum(axis=1).tolist()
+        return self.participation.take(indices, axis=1).sum(axis=1).tolist()
 
-    def largest(self, places: Indices) -> list[float]:
+    def largest(self, indices: Indices) -> list[float]:
         """The largest share of one of some states in every mode."""
-        return self.participation.take(places, axis=1).max(axis=1).tolist()
+        return self.participation.take(indices, axis=1).max(axis=1).tolist()
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,13 +280,13 @@ class _States:
         return [_Group("drive", False, (), found, {}, {}, {})] if len(found) else []
 
     @cached_property
-    def places(self) -> dict[str, int]:
-        """Of the states by name."""
+    def indices(self) -> dict[str, int]:
+        """Index of each state by name."""
         return {name: i for i, name in enumerate(self.names)}
 
     @cached_property
     def families(self) -> dict[str, Indices]:
-        """Places of the states of each family."""
+        """Indices of the states of each family."""
         return {family: self.where(family=family) for family in dict.fromkeys(part.family for part in self.parts)}
 
     @cached_property
@@ -296,7 +296,7 @@ class _States:
 
     @cached_property
     def turning(self) -> dict[int, list[Indices]]:
-        """Places of the rates of the first harmonic of flap and of lag of each rotor."""
+        """Indices of the rates of the first harmonic of flap and of lag of each rotor."""
         pairs = {
             rotor: [self.where(family=family, harmonic=1, rotor=rotor, is_rate=True) for family in ("flap", "lag")]
             for rotor in self.sizes
@@ -304,7 +304,7 @@ class _States:
         return {rotor: [pair for pair in found if len(pair) == 2] for rotor, found in pairs.items()}
 
     def where(self, **wanted: object) -> Indices:
-        """Places of the states whose parts have these attributes, in the order of their names."""
+        """Indices of the states whose parts have these attributes, in the order of their names."""
         items = wanted.items()
         found = [i for i, part in enumerate(self.parts) if all(getattr(part, key) == value for key, value in items)]
         return np.array(sorted(found, key=lambda i: self.names[i]), dtype=np.int64)
@@ -326,9 +326,9 @@ class _Group(ByContent):
     rotors : tuple of int
         Their indices.
     states : ndarray of int
-        Places of the states.
+        Indices of the states.
     by_harmonic, by_rotor, by_both : dict of ndarray of int
-        Places of those of a harmonic, of a rotor, and of a rotor and a harmonic without rates; of rotors only.
+        Indices of those of a harmonic, of a rotor, and of a rotor and a harmonic without rates; of rotors only.
     """
 
     family: str
@@ -401,7 +401,7 @@ def _choices(found: _Found, groups: Sequence[_Group], states: _States) -> list[l
     largest share. Others that come near remain choices.
     """
     leads = found.participation.argmax(axis=1).tolist()
-    families = {family: found.sums(places) for family, places in states.families.items()}
+    families = {family: found.sums(indices) for family, indices in states.families.items()}
     measures = [_measures(found, group) for group in groups]
     return [
         _own_choices(
@@ -420,7 +420,7 @@ def _measures(found: _Found, group: _Group) -> list[float]:
     total = found.sums(group.states)
     if len(group.rotors) < 2:
         return total
-    largest = map(max, zip(*(found.sums(places) for places in group.by_rotor.values()), strict=True))
+    largest = map(max, zip(*(found.sums(indices) for indices in group.by_rotor.values()), strict=True))
     return [_named_share(one, both) for one, both in zip(largest, total, strict=True)]
 
 
@@ -492,9 +492,9 @@ def _labels(found: _Found, chosen: Sequence[_Group], speeds: Mapping[int, float]
 
 def _drive_name(row: Sequence[float], states: _States) -> str:
     """Name of a mode after the state of a drive that has the largest share."""
-    places = states.where(family="drive").tolist()
-    name, _, number = states.names[max(places, key=lambda i: row[i])].partition("(")
-    several = len({states.names[i].partition("(")[2] for i in places}) > 1
+    indices = states.where(family="drive").tolist()
+    name, _, number = states.names[max(indices, key=lambda i: row[i])].partition("(")
+    several = len({states.names[i].partition("(")[2] for i in indices}) > 1
     return f"{DRIVE_MODES[name]}{', drive ' + number.rstrip(')') if several else ''}"
 
 
@@ -509,8 +509,8 @@ def _stand_name(row: Sequence[float], states: _States) -> str:
 
 def _shares(row: Sequence[float], states: _States, wanted: Iterable[str]) -> dict[str, float]:
     """Shares of states in a mode, 0 of those that there are not."""
-    places = states.places
-    return {name: row[places[name]] if name in places else 0.0 for name in wanted}
+    indices = states.indices
+    return {name: row[indices[name]] if name in indices else 0.0 for name in wanted}
 
 
 def _is_heave_yaw(found: _Found, number: int, states: _States) -> bool:
@@ -577,9 +577,9 @@ def _rotor_labels(
 
     One for one, because some are close together: with nu near 1/2 collective and regressing lag are.
     """
-    slots = [harmonic for harmonic, places in group.by_harmonic.items() for _ in places]
-    shares = {harmonic: _of(found.sums(places), inside) for harmonic, places in group.by_harmonic.items()}
-    by_rotor = {rotor: _of(found.sums(places), inside) for rotor, places in group.by_rotor.items()}
+    slots = [harmonic for harmonic, indices in group.by_harmonic.items() for _ in indices]
+    shares = {harmonic: _of(found.sums(indices), inside) for harmonic, indices in group.by_harmonic.items()}
+    by_rotor = {rotor: _of(found.sums(indices), inside) for rotor, indices in group.by_rotor.items()}
     own = [found.modes[i] for i in inside]
     largest = [max(shares, key=lambda harmonic: shares[harmonic][i]) for i in range(len(inside))]
     return [
@@ -673,7 +673,7 @@ def _rank(found: list[Mode], name: str, ways: tuple[str, str]) -> list[Mode]:
 
 
 def _first_matrix_name(mode: Mode, parts: Sequence[Part]) -> str:
-    """Name after Table 5; the coupled cyclic modes are told apart by `_rank`."""
+    """Name after Table 5; `_rank` distinguishes the coupled cyclic modes."""
     flap = sum(share for share, part in zip(mode.participation, parts, strict=True) if part.family == "flap")
     cyclic = sum(share for share, part in zip(mode.participation, parts, strict=True) if part.harmonic != 0) > 0.5
     if COUPLED < flap < 1.0 - COUPLED:

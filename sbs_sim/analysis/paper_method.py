@@ -67,18 +67,18 @@ def blocks(aircraft: Aircraft, point: TrimPoint, steps: Array) -> dict[str, Arra
     full[rotor, rotor] += first
     full[inflow, inflow] += gain
     found = {"A": full[np.ix_(used, used)], "B": full[used, size:]}
-    places = {"B": used[used < rotor.start], "lambda": used[used >= inflow.start]}
-    places["R"] = np.setdiff1d(used, [*places["B"], *places["lambda"]])
+    indices = {"B": used[used < rotor.start], "lambda": used[used >= inflow.start]}
+    indices["R"] = np.setdiff1d(used, [*indices["B"], *indices["lambda"]])
     for row in ("B", "R", "lambda"):
         for column in ("B", "R", "lambda"):
-            found[f"A_{row}-{column}"] = full[np.ix_(places[row], places[column])]
+            found[f"A_{row}-{column}"] = full[np.ix_(indices[row], indices[column])]
     found |= taylor.coupling_blocks()
-    inside = places["R"] - rotor.start
+    inside = indices["R"] - rotor.start
     found["A_R_first"] = first[np.ix_(inside, inside)]
-    found["A_R_second"] = slopes[np.ix_(places["R"], used)]
-    within = places["lambda"] - inflow.start
+    found["A_R_second"] = slopes[np.ix_(indices["R"], used)]
+    within = indices["lambda"] - inflow.start
     found["C_lambda"] = gain[np.ix_(within, within)]
-    found["A_lambda_second"] = slopes[np.ix_(places["lambda"], used)]
+    found["A_lambda_second"] = slopes[np.ix_(indices["lambda"], used)]
     found["A_quasi_static"] = settle(found["A"], found["B"], range(S.LINEAR_BODY_SIZE))[0]
     return found
 
@@ -93,15 +93,15 @@ class _TaylorTerms:
         self._engine = Engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
         self._psi = azimuths(aircraft.passages, point.azimuth_count)
         self._constant = [self._turning(rotor) for rotor in aircraft.rotors]
-        self._at_trim = [self._coupling(j, point.state[self._places(j)[0]]) for j in range(len(aircraft.rotors))]
+        self._at_trim = [self._coupling(j, point.state[self._rotor_slices(j)[0]]) for j in range(len(aircraft.rotors))]
 
-    def _places(self, rotor: int) -> list[slice]:
+    def _rotor_slices(self, rotor: int) -> list[slice]:
         """Indices of one rotor's flap, flap rates, lag, lag rates in the linear state."""
         shift = S.LINEAR_BODY_SIZE - S.BODY_SIZE
         found = (self.layout.flap, self.layout.flap_rate, self.layout.lag, self.layout.lag_rate)
         return [slice(where(rotor).start + shift, where(rotor).stop + shift) for where in found]
 
-    def _inflow_place(self, rotor: int) -> slice:
+    def _inflow_slice(self, rotor: int) -> slice:
         return slice(self.inflow_start + 3 * rotor, self.inflow_start + 3 * rotor + 3)
 
     def slopes(self, steps: Array, inputs: Sequence[int]) -> Array:
@@ -115,12 +115,12 @@ class _TaylorTerms:
         return result
 
     def expanded(self, inputs: Array) -> Array:
-        """F/m, I^-1 M, C0 xi0 + E of flap, C0 beta0 + E of lag, C^lambda lambda0 + E, in the linear state's places."""
+        """F/m, I^-1 M, C0 xi0 + E of flap, C0 beta0 + E of lag, C^lambda lambda0 + E, in the linear state's order."""
         state, rates = inputs[: self.layout.linear_size], self._rates(inputs)
         result = np.zeros(self.layout.linear_size)
         self._expand_body(state, rates, result)
         for j, (k0, k1) in enumerate(self._constant):
-            flap, flap_rate, lag, lag_rate = self._places(j)
+            flap, flap_rate, lag, lag_rate = self._rotor_slices(j)
             flapped = not np.array_equal(state[flap], self.trim[flap])
             c0b, c1b, c0x, c1x = self._coupling(j, state[flap]) if flapped else self._at_trim[j]
             beta, dbeta, xi, dxi = state[flap], state[flap_rate], state[lag], state[lag_rate]
@@ -192,13 +192,13 @@ class _TaylorTerms:
         for name in names:
             found[name] = np.zeros((n, n))
         for j, (k0, k1) in enumerate(self._constant):
-            flap = self._places(j)[0]
+            flap = self._rotor_slices(j)[0]
             c0b, c1b, c0x, c1x = self._at_trim[j]
-            place = slice(flap.start - S.LINEAR_BODY_SIZE, flap.stop - S.LINEAR_BODY_SIZE)
+            part = slice(flap.start - S.LINEAR_BODY_SIZE, flap.stop - S.LINEAR_BODY_SIZE)
             values = {"K0_beta": k0, "K1_beta": k1, "K0_xi": k0, "K1_xi": k1}
             values |= {"C0_beta": c0b, "C1_beta": c1b, "C0_xi": c0x, "C1_xi": c1x}
             for name in names:
-                found[name][place, place] = values[name]
+                found[name][part, part] = values[name]
         return found
 
     def first_matrix(self) -> Array:
@@ -225,9 +225,9 @@ class _TaylorTerms:
         rotors, cyclic = self.aircraft.model().rotors, int(self.point.cyclic_inflow)
         for j, rotor in enumerate(self.aircraft.rotors):
             at_hub = hub_axes(rotor.shaft_direction).T @ (velocity + np.cross(om, rotor.hub))
-            flow, place = at_hub / (rotor.speed * rotor.radius), self._inflow_place(j)
+            flow, part = at_hub / (rotor.speed * rotor.radius), self._inflow_slice(j)
             own = np.zeros((3, 3, 1))
-            inflow_matrix(rotors, j, state[[place.start], np.newaxis], flow[:, np.newaxis], cyclic, own)
+            inflow_matrix(rotors, j, state[[part.start], np.newaxis], flow[:, np.newaxis], cyclic, own)
             within = slice(3 * j, 3 * j + 3)
             result[within, within] = own[..., 0]
         return result

@@ -1,8 +1,8 @@
 """Counterparts of the paper's Figures 4, 5 and 7 to 22. No window and no global state of matplotlib is used.
 
-The complete model and the paper's reading stand in every figure, and the printed poles, where there are some, as hollow
-markers. Colours are those of Okabe and Ito, which people see alike who do not see all colours; lines, markers and
-hatches differ as well, so that the figures can be read in grey. Sizes are those of print: 7 inches are a page's width.
+Every figure has the complete model and the paper's reading; printed poles, where there are some, are hollow markers.
+Colours are those of Okabe and Ito, which the colour-blind can distinguish; lines, markers and hatches differ as well,
+so that the figures can be read in grey. Sizes are those of print: a page is 7 inches wide.
 """
 
 import io
@@ -193,7 +193,7 @@ def _trim_curve(axes: Axes, speeds: Array, curve: Mapping[str, Sequence[float]],
 
 
 def _gaps(missing: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last place of each run of missing values."""
+    """First and last index of each run of missing values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], missing.astype(int), [0]])))
     return [(int(start), int(end) - 1) for start, end in edges.reshape(-1, 2)]
 
@@ -249,7 +249,7 @@ def _poles(table: Comparison) -> list[tuple[str, str, complex]]:
 
 
 def _draw_poles(axes: Axes, table: Comparison) -> None:
-    """Upper half of the plane; the printed poles are the largest, so that they stand around ours where they agree."""
+    """Upper half of the plane; the printed poles are the largest, to be seen around ours where they agree."""
     axes.axvline(0.0, color="0.35", linewidth=0.8)
     axes.axhline(0.0, color="0.35", linewidth=0.8)
     for mode, source, pole in _poles(table):
@@ -288,9 +288,9 @@ def _draw_inflow(axes: Axes, report: Report) -> None:
             poles = entry.others[name]
             rows[row] += list(poles) if isinstance(poles, list) else []
     fills = ("none", GREEN, ORANGE, BLUE)
-    for place, (poles, fill) in enumerate(zip(rows.values(), fills, strict=True)):
+    for height, (poles, fill) in enumerate(zip(rows.values(), fills, strict=True)):
         real = [pole.real for pole in poles]
-        axes.plot(real, [place] * len(real), "h", markersize=8.0, mec=INK, mew=0.8, mfc=fill)
+        axes.plot(real, [height] * len(real), "h", markersize=8.0, mec=INK, mew=0.8, mfc=fill)
     axes.set_yticks(range(len(rows)), list(rows))
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel("real part [rad/s]")
@@ -393,10 +393,10 @@ def _draw_bars(axes: Axes, bars: Mapping[str, Mapping[str, float]], labels: Mapp
     states = list(dict.fromkeys(state for own in bars.values() for state in own))
     width = 0.8 / max(len(bars), 1)
     for i, (name, own) in enumerate(bars.items()):
-        places = np.arange(len(states)) + (i - (len(bars) - 1) / 2) * width
+        positions = np.arange(len(states)) + (i - (len(bars) - 1) / 2) * width
         heights = [own.get(state, 0.0) for state in states]
         axes.bar(
-            *(places, heights, width),
+            *(positions, heights, width),
             color=POLES[name][0],
             hatch=HATCHES[name],
             edgecolor=INK,

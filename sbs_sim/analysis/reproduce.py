@@ -358,9 +358,9 @@ def _blocks(aircraft: Aircraft, model: LinearModel, coning: float | None = None)
     """Blocks of the paper's construction about a trim, or about one with another coning in all rotors."""
     point = model.trim
     if coning is not None:
-        places = [i for i, name in enumerate(point.state_names) if name.startswith("a0(")]
+        coordinates = [i for i, name in enumerate(point.state_names) if name.startswith("a0(")]
         state = point.state.copy()
-        state[places] = coning
+        state[coordinates] = coning
         point = replace(point, state=state)
     return linearize(aircraft, method="paper", point=point).blocks
 

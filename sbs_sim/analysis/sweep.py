@@ -333,8 +333,8 @@ def _checked_values(values: ArrayLike) -> list[float]:
     if numbers.ndim != 1 or numbers.size == 0:
         raise SweepError(f"values have the shape {numbers.shape}: allowed is a list of at least one number")
     if not np.isfinite(numbers).all():
-        place = int(np.flatnonzero(~np.isfinite(numbers))[0])
-        raise SweepError(f"values[{place}] = {numbers[place]}: allowed are finite numbers")
+        index = int(np.flatnonzero(~np.isfinite(numbers))[0])
+        raise SweepError(f"values[{index}] = {numbers[index]}: allowed are finite numbers")
     return [float(value) for value in numbers]
 
 

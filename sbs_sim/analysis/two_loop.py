@@ -64,9 +64,9 @@ def solve_by_two_loops(problem: TrimProblem, condition: TrimCondition, start: Ar
 class _TwoLoops:
     """The loops on their way: the unknowns, and what to tell about them if they fail.
 
-    Equations and unknowns of the problem stand in one order: accelerations of the body and attitude with controls,
+    Equations and unknowns of the problem have the same order: accelerations of the body and attitude with controls,
     accelerations of the multiblade coordinates and these, inflow rates and inflow. So each block is solved for the
-    unknowns in its own places, with all others held.
+    unknowns with the same indices, with all others held.
     """
 
     def __init__(self, problem: TrimProblem, condition: TrimCondition, start: Array) -> None:

@@ -1,8 +1,8 @@
-"""Who may look at the page and fly: the page itself, not the pages of others that a browser has open as well.
+"""Access to the flight: only our own page may connect, not pages of others that the browser has open as well.
 
-A browser lets any page connect to a WebSocket on this machine, and tells in the header `Origin` which page it was (RFC
-6455, section 10.2). A page whose name is made to lead here while it is open, DNS rebinding, is told by the name in
-`Host`. Viser checks neither.
+A browser lets any page connect to a WebSocket on this machine; the header `Origin` says which page it was (RFC 6455,
+section 10.2). In DNS rebinding, the name of a foreign page is made to resolve to this machine while the page is open;
+the header `Host` then has that name. Viser checks neither.
 """
 
 import contextlib

@@ -165,7 +165,7 @@ class ChartColumn:
     server : ViserServer
     charts : sequence of Chart
     heading : str
-        What stands above them.
+        Their title.
     """
 
     def __init__(self, server: ViserServer, charts: Sequence[Chart], heading: str = "") -> None:

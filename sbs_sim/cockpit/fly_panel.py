@@ -83,7 +83,7 @@ class Pilot(Protocol):
 
 
 class FlyPanel:
-    """Controls, clock, place and wind of a live flight.
+    """Controls, clock, position and wind of a live flight.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ RESET_DISTANCE, RESET_SPEED = 0.5, 100.0  # m and m/s: what is further or faster
 ARROW_OF_WEIGHT = 0.5  # m, arrow of a rotor that carries its share of the weight
 ARROW_OF_MOMENT = 6.0  # m, arrow of a moment of that share at 1 m
 MIN_ARROW_LENGTH = 1e-3  # m
-# Viridis (Smith and van der Walt) at nine places: lightness grows evenly, and all people see it alike.
+# Viridis (Smith and van der Walt) at nine points: lightness grows evenly, and all people see it alike.
 COLOURS = np.array(
     [
         (68, 1, 84),

@@ -253,7 +253,7 @@ def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], left: Se
         One for each column.
     rows : sequence of sequence of str
     left : sequence of int
-        Columns that stand at the left, as texts do; numbers stand at the right.
+        Columns aligned to the left, as texts are; the others, numbers, are aligned to the right.
     """
     table = [headings, *rows]
     widths = [max(len(row[i]) for row in table) for i in range(len(headings))]

@@ -1,4 +1,4 @@
-"""`gusts`: the hover hold, and how it holds its place in turbulence and gusts."""
+"""`gusts`: the hover hold, and how it holds its position in turbulence and gusts."""
 
 import argparse
 import math
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 GUST_DELAY, AFTER_GUST = 1.0, 12.0  # s before a gust, and after it
 SETTLING = 10.0  # s, in which the integrals learn the steady wind; not in the figures
 MIN_TURBULENCE_AIRSPEED = 1.0  # m/s at which the frozen field passes where there is no wind
-PLACE = ("north", "east", "down")
+POSITION = ("north", "east", "down")
 MAX_DURATION = 3600.0  # s
 
 
@@ -139,15 +139,15 @@ def _flown(
 
 
 def _figures(craft: "Aircraft", flight: Any, settling: float) -> dict[str, float]:
-    """Errors of place [m] and heading [rad], and the motion of the controls of the axes [rad], from a time [s] on."""
+    """Errors of position [m] and heading [rad], and motion of the controls of the axes [rad], from a time [s] on."""
     import numpy as np
 
     used = flight["time"] >= settling
-    error = np.stack([flight[name][used] for name in PLACE])
+    error = np.stack([flight[name][used] for name in POSITION])
     distance = np.linalg.norm(error, axis=0)
     w, x, y, z = (flight[name][used] for name in ("qw", "qx", "qy", "qz"))
     heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))  # as quaternion_to_euler
-    figures = {f"rms_{name}": _rms(row) for name, row in zip(PLACE, error, strict=True)}
+    figures = {f"rms_{name}": _rms(row) for name, row in zip(POSITION, error, strict=True)}
     figures |= {"rms_distance": _rms(distance), "largest_distance": float(distance.max())}
     figures |= {"rms_heading": _rms(heading)}
     spread = flight["controls"][used].std(axis=0)
@@ -160,7 +160,7 @@ def _rms(values: Any) -> float:
 
 def _print(results: dict[str, dict[str, float]]) -> None:
     print("\nerror of position [m], RMS, and of heading [deg], RMS; standard deviation of the controls [deg]")
-    headings = ["", *PLACE, "all", "largest", "heading", "coll.", "lat.", "long.", "diff."]
+    headings = ["", *POSITION, "all", "largest", "heading", "coll.", "lat.", "long.", "diff."]
     rows = []
     for name, figures in results.items():
         values = list(figures.values())

@@ -1,4 +1,4 @@
-"""`linearize`: linear model about a steady flight, its modes, and what they stand on."""
+"""`linearize`: linear model about a steady flight, its modes, and the options on which they depend."""
 
 import argparse
 import math

@@ -55,7 +55,7 @@ def _work(arguments: argparse.Namespace) -> None:
     check_target(arguments.json)
     craft = Aircraft.load(arguments.aircraft) if arguments.aircraft else undamped_sbs()
     paper_craft = Aircraft.load(arguments.paper_aircraft)
-    if arguments.out:  # a bad path is told before the work, not after it
+    if arguments.out:  # a bad path is refused before the work, not after it
         from sbs_sim.analysis.page import make_folder
 
         make_folder(arguments.out)

@@ -341,7 +341,7 @@ def blade_pitch(aircraft, blade, pose, swash):
 
 @kernel
 def pitch_rate(aircraft, blade, pose, swash):
-    """Rate of the pitch of blades [rad/s], eq. (4.8) differentiated, with swashplates that stand still."""
+    """Rate of the pitch of blades [rad/s], eq. (4.8) differentiated, with swashplates that do not move."""
     angles, quad = aircraft.indices.swash, blade.quad
     cosine, sine = swashplate_azimuth(blade, pose)
     lateral = spread(swash, angles[S.LATERAL], quad, blade)

@@ -101,19 +101,19 @@ class CockpitStartup:
         host, port, alone = self._options.host, self._options.port, self._options.attach or self._options.logs
         check_address(host, port)
         folder = checked_folder(self._options.logs)
-        lookout, since = Component("cockpit_lookout"), time.monotonic()
+        observer, since = Component("cockpit_observer"), time.monotonic()
         try:
-            certain = not alone and alone_in_domain(lookout.context.get_domain_id())
+            certain = not alone and alone_in_domain(observer.context.get_domain_id())
             if certain:
                 self._simulator = SimulatorProcess(self._ros_arguments, self._end)
-            # meanwhile the flight begins, or the lookout discovers others
+            # meanwhile the flight begins, or the observer discovers others
             from sbs_sim.nodes.cockpit_node import Cockpit
 
             if not alone and not certain:
-                _refuse_second_simulator(lookout, since + 2 * DISCOVERY_TIME)  # half of it goes by importing
+                _refuse_second_simulator(observer, since + 2 * DISCOVERY_TIME)  # half of it goes by importing
                 self._simulator = SimulatorProcess(self._ros_arguments, self._end)
         finally:
-            lookout.destroy_node()
+            observer.destroy_node()
         self._cockpit = Cockpit(host, port, self._end, not alone, folder)
         return [self._cockpit]
 
@@ -189,10 +189,10 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     return options
 
 
-def _refuse_second_simulator(lookout: Component, until: float) -> None:
+def _refuse_second_simulator(observer: Component, until: float) -> None:
     """Raise SbsError if a simulator is discovered whose topics this one would publish too."""
-    inflow = lookout.resolve_topic_name("inflow")  # where it is remapped, too
-    while not lookout.count_publishers(inflow):
+    inflow = observer.resolve_topic_name("inflow")  # where it is remapped, too
+    while not observer.count_publishers(inflow):
         if (left := until - time.monotonic()) <= 0.0:
             return
         time.sleep(min(left, 0.05))

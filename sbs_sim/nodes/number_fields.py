@@ -1,6 +1,6 @@
 """Numbers in messages that were none of the kind that their field takes.
 
-Since Jazzy, rclpy looks at no type unless ROS_PYTHON_CHECK_FIELDS is 1: it takes the bytes of whatever object stands in
+Since Jazzy, rclpy looks at no type unless ROS_PYTHON_CHECK_FIELDS is 1: it takes the bytes of whatever object is in
 a float64 field. Those of an integer make a number next to zero (`Vector3(x=5)` arrives as 5e-324), or, of a negative
 one before Python 3.12, none at all. Arrays are converted, whatever they are made from.
 """
@@ -13,7 +13,7 @@ from typing import Any
 from sbs_sim.errors import SbsError, SimulationError
 
 MIN_NORMAL = sys.float_info.min  # in size: below, a float64 has lost digits already, and no unit makes that of use
-CAUSE = "an integer in a float field? 5.0 is meant where 5 stands, ROS_PYTHON_CHECK_FIELDS=1 finds it"
+CAUSE = "an integer in a float field? write 5.0 in place of 5; ROS_PYTHON_CHECK_FIELDS=1 finds it"
 
 
 def check_numbers(message: Any, decaying: Collection[str] = (), error: type[SbsError] = SimulationError) -> None:

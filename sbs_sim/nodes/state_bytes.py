@@ -139,8 +139,8 @@ class StateBytes:
     def _rotors_fields(self, aircraft: Aircraft) -> Iterator[tuple[str, tuple[int, float]]]:
         first_blade, layout = 0, aircraft.layout
         for i in range(len(layout.drives)):
-            for name, place in layout.drive(i).items():
-                yield f"drives[{i}].{DRIVE_FIELDS.get(name, name)}", (place, 1.0)
+            for name, at in layout.drive(i).items():
+                yield f"drives[{i}].{DRIVE_FIELDS.get(name, name)}", (at, 1.0)
         for j, rotor in enumerate(aircraft.rotors):
             own = f"rotors[{j}]."
             if layout.drives:

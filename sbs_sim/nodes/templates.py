@@ -1,12 +1,11 @@
 """Messages as bytes in which numbers are written, without ROS's own way through Python objects.
 
-What a simulator publishes at every tick is always laid out in the same way: texts and the lengths of lists stay, and
-numbers change. So ROS serialises such a message once, and then only its numbers are written.
+The messages of every tick of a simulator have the same layout: texts and lengths of lists stay, and numbers change. So
+ROS serialises such a message once, and then only its numbers are written.
 
-Where they are is found by asking ROS, not by a layout of our own: the message is filled with random numbers and
-serialised, several times, and the place of a number is the only one that has held it each time. At last new numbers are
-written there, and ROS must read these and nothing else. So a ROS that lays messages out in another way is either
-understood or refused.
+ROS itself shows where they are: the message is filled with random numbers and serialised several times, and the offset
+of a number is the only one at which it was found each time. Finally new numbers are written there, and ROS must read
+these and nothing else. So a ROS with another layout of messages is either understood or refused.
 """
 
 import random
@@ -48,7 +47,7 @@ class Template:
     Raises
     ------
     LayoutError
-        A number has no place, or several, or ROS does not read what was written.
+        A number is at no offset or at several, or ROS does not read what was written.
     """
 
     def __init__(self, message: Any, fields: Mapping[str, str]) -> None:
@@ -96,7 +95,7 @@ _WIDTHS = {DOUBLE: 8, COUNT: 8, INT: 4, UINT: 4, BYTE: 1}
 
 
 def _offsets(message: Any, fields: Mapping[str, str]) -> dict[str, int]:
-    """Of every number the only place that holds it whatever it is, in bytes from the beginning of the message."""
+    """Of every number the only offset that holds it whatever it is, in bytes from the beginning of the message."""
     least, most = ROUNDS
     found: dict[str, set[int]] = {}
     for turn in range(most):
@@ -106,25 +105,27 @@ def _offsets(message: Any, fields: Mapping[str, str]) -> dict[str, int]:
             _set(message, name, number)
         data = serialize_message(message)
         for name, kind in fields.items():
-            seen = _places_of(struct.pack(f"<{kind}", numbers[name]), data)
+            seen = _offsets_of(struct.pack(f"<{kind}", numbers[name]), data)
             found[name] = found[name] & seen if turn else seen
-        if any(not places for places in found.values()):
+        if any(not offsets for offsets in found.values()):
             break
-        if turn + 1 >= least and all(len(places) == 1 for places in found.values()):
-            return {name: places.pop() for name, places in found.items()}
-    name, places = next((name, places) for name, places in found.items() if len(places) != 1)
-    raise LayoutError(f"{_name(message)}: {name} is at {len(places)} places of the serialised message, 1 is understood")
+        if turn + 1 >= least and all(len(offsets) == 1 for offsets in found.values()):
+            return {name: offsets.pop() for name, offsets in found.items()}
+    name, offsets = next((name, offsets) for name, offsets in found.items() if len(offsets) != 1)
+    raise LayoutError(
+        f"{_name(message)}: {name} is at {len(offsets)} offsets of the serialised message, 1 is understood"
+    )
 
 
-def _places_of(pattern: bytes, data: bytes) -> set[int]:
+def _offsets_of(pattern: bytes, data: bytes) -> set[int]:
     """Where a number can be: at multiples of its size behind the head."""
-    places, width = set(), len(pattern)
-    place = data.find(pattern, HEAD)
-    while place >= 0:
-        if (place - HEAD) % width == 0:
-            places.add(place)
-        place = data.find(pattern, place + 1)
-    return places
+    offsets, width = set(), len(pattern)
+    offset = data.find(pattern, HEAD)
+    while offset >= 0:
+        if (offset - HEAD) % width == 0:
+            offsets.add(offset)
+        offset = data.find(pattern, offset + 1)
+    return offsets
 
 
 def _some_number(kind: str, chance: random.Random) -> Any:

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 PLAIN: dict[str, Any] = {"parse_math": False}  # names come from files and messages: a $ begins no formula
 LABEL_SIZE = 7.5  # points
-SAME_PLACE = 8.0  # pixels between poles that cannot be told apart
+SAME_PLACE = 8.0  # pixels between poles that cannot be distinguished
 LABEL_ANGLES = (15, -15, 165, -165, 60, -60, 120, -120, 90, -90)  # deg, in the order of preference
 LABEL_DISTANCES = (8, 16, 26, 38, 52, 70, 90, 115)  # points
 
@@ -38,7 +38,7 @@ def name_poles(
     size : float
         Of the letters [points].
     joined : callable
-        One text of the names of poles that cannot be told apart.
+        One text of the names of poles that cannot be distinguished.
     """
     pixels = _pixels(axes, dots)
     taken: list[Bbox] = []
@@ -77,7 +77,7 @@ def _together(axes: Axes, poles: Mapping[str, complex]) -> list[tuple[complex, l
 
 
 def _place(label: Annotation, frame: Bbox, dots: Array, taken: list[Bbox]) -> Bbox:
-    """Move a label to the best of the places to try; the box that it fills."""
+    """Move a label to the best of the positions to try; the box that it fills."""
     figure = label.get_figure(root=True)
     axes = label.axes
     assert isinstance(axes, Axes)
@@ -86,16 +86,16 @@ def _place(label: Annotation, frame: Bbox, dots: Array, taken: list[Bbox]) -> Bb
     origin = _pixels(axes, np.array([complex(*label.xy)]))[0]
     # as a text: the box of an annotation has its line in it
     size = Text.get_window_extent(label, figure.canvas.get_renderer())  # type: ignore[attr-defined]
-    places = [(distance, math.radians(angle)) for distance in LABEL_DISTANCES for angle in LABEL_ANGLES]
+    positions = [(distance, math.radians(angle)) for distance in LABEL_DISTANCES for angle in LABEL_ANGLES]
     costs = []
-    for distance, angle in places:
+    for distance, angle in positions:
         along, up = math.cos(angle), math.sin(angle)
         x, y = origin + distance * dots_per_point * np.array([along, up])
         x -= {"left": 0.0, "center": 0.5, "right": 1.0}[_side(along)] * size.width
         box = Bbox.from_bounds(x, y - size.height / 2, size.width, size.height).padded(1.0)
         costs.append((_cost(box, frame, dots, taken) + distance / 50.0, box))
     best = min(range(len(costs)), key=lambda i: costs[i][0])
-    distance, angle = places[best]
+    distance, angle = positions[best]
     label.set_position((distance * math.cos(angle), distance * math.sin(angle)))
     label.set_horizontalalignment(_side(math.cos(angle)))
     return costs[best][1]
@@ -107,7 +107,7 @@ def _side(along: float) -> Literal["left", "center", "right"]:
 
 
 def _cost(box: Bbox, frame: Bbox, dots: Array, taken: list[Bbox]) -> float:
-    """How bad a place is: names on names, outside of the frame, poles covered."""
+    """How bad a position is: names on names, outside of the frame, poles covered."""
     inside = (dots[:, 0] > box.x0) & (dots[:, 0] < box.x1) & (dots[:, 1] > box.y0) & (dots[:, 1] < box.y1)
     outside = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
     return 20.0 * sum(box.overlaps(other) for other in taken) + 50.0 * outside + float(inside.sum())

@@ -1,4 +1,4 @@
-"""How curves are told apart in plots.
+"""How curves are distinguished in plots.
 
 The colours are those of Okabe and Ito, which people see alike who do not see all colours.
 """

@@ -1,7 +1,7 @@
 """Stability augmentation: rates and attitude fed back around trimmed controls, the sticks of a pilot added.
 
 Designed like the hover hold from the linear model (rotors settled, a lag of every control, LQR), but with speeds held:
-what it does not feed back it does not see. So speeds and place are the pilot's, and attitude follows the sticks.
+what it does not feed back it does not see. So speeds and position are the pilot's, and attitude follows the sticks.
 """
 
 from __future__ import annotations  # `help` then shows types by their names

@@ -1,8 +1,8 @@
 """Hover hold: position and heading by state feedback, from the linear model of hover to the controls of every tick.
 
 1. Rotors and inflow are taken to have settled (theory.md section 9.2): eight body states are left of 38.
-2. Place and heading are appended, their integrals, which find the controls that a steady wind needs, and a lag of every
-   control. The lag keeps feedback from the lag motion of the blades, at 125 rad/s and hardly damped.
+2. Appended are position and heading, their integrals, which find the controls that a steady wind needs, and a lag of
+   every control. That lag keeps the feedback away from the lag motion of the blades, at 125 rad/s and hardly damped.
 3. Gains by LQR, weighted by Bryson's rule. A new target moves the integrals to where the cost is least, or they would
    have to overshoot it.
 4. The result is checked with all 38 states, sampled at every tick, its controls one tick late.

@@ -1,13 +1,13 @@
 """Messages in CDR to arrays.
 
-The messages of a topic mostly have their values at the same places, for their texts and lists keep their lengths. Then
-one numpy structured type describes them all, and all are taken apart at once; `Layout` makes it. Where the lengths
-vary, `decode_one_by_one` does the same message by message with the package `mcap_ros2`.
+The texts and lists in the messages of a topic mostly keep their lengths, and so the values keep their offsets. Then one
+numpy structured type describes all messages, and they are decoded at once; `Layout` makes it. Where the lengths vary,
+`decode_one_by_one` does the same message by message with the package `mcap_ros2`.
 
-CDR as ROS 2 writes it (XCDR1): 4 bytes say the byte order, and every number stands at a multiple of its size, counted
-from behind these 4. A text is its length, with a closing zero, and its bytes; a list is its length and its values.
-What stands in the gaps is left to chance. So are some bytes at the end, for Fast DDS reckons with a gap in front of the
-values of an empty list and then writes none.
+CDR as ROS 2 writes it (XCDR1): 4 bytes say the byte order. Behind them the offset of every number is a multiple of its
+size. A text is its length, with a closing zero, and its bytes; a list is its length and its values.
+The bytes in the gaps are undefined. So are some bytes at the end: Fast DDS counts a gap in front of the values of an
+empty list and then writes none.
 """
 
 import struct
@@ -35,7 +35,7 @@ MAX_MESSAGE_SIZE = 1 << 28  # bytes of one that was compressed
 
 
 class Layout:
-    """Places of all values in a message; they are the same in all messages with the same lengths.
+    """Offsets and types of all values in a message; they are the same in all messages with the same lengths.
 
     Parameters
     ----------
@@ -59,51 +59,51 @@ class Layout:
         self._definitions, self._sample = definitions, sample
         self._offset = HEAD
         self._padding = PADDING
-        self._places: dict[str, tuple[str | tuple[str, tuple[int]], int]] = {"#order": ("u2", 0)}
+        self._formats: dict[str, tuple[str | tuple[str, tuple[int]], int]] = {"#order": ("u2", 0)}
         self._constants = {"#order": int.from_bytes(sample[:2], "little")}  # what must be alike in all messages
-        self._columns: dict[str, list[str] | None] = {}  # places of the texts of a column that is a list of texts
+        self._columns: dict[str, list[str] | None] = {}  # names of the texts of a column that is a list of texts
         self._texts: set[str] = set()  # columns that are single texts
         self._message(root, "")
         if not 0 <= len(sample) - self._offset <= self._padding:
             raise RecordingError(f"a message of {len(sample)} bytes does not agree with the definition of {root}")
 
     def fits(self, message: bytes) -> bool:
-        """True if a message has its values at the same places."""
+        """True if a message has its values at the same offsets."""
         return len(message) == len(self._sample) and all(
-            message[place : place + len(constant)] == constant for place, constant in self._marks
+            message[offset : offset + len(constant)] == constant for offset, constant in self._marks
         )
 
     @cached_property
     def _marks(self) -> list[tuple[int, bytes]]:
-        """Bytes that are alike in all messages of the layout, with their places."""
-        sizes = ((self._places[name][1], np.dtype(self._places[name][0]).itemsize) for name in self._constants)
-        return [(place, self._sample[place : place + size]) for place, size in sizes]
+        """Bytes that are alike in all messages of the layout, with their offsets."""
+        sizes = ((self._formats[name][1], np.dtype(self._formats[name][0]).itemsize) for name in self._constants)
+        return [(offset, self._sample[offset : offset + size]) for offset, size in sizes]
 
     def decode(self, messages: Sequence[bytes]) -> Columns | None:
         """Values of many messages by flattened names, if all have this layout."""
         size = len(self._sample)
         if any(len(message) != size for message in messages):
             return None
-        names = list(self._places)
-        formats, offsets = zip(*self._places.values(), strict=True)
+        names = list(self._formats)
+        formats, offsets = zip(*self._formats.values(), strict=True)
         dtype = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
         values = np.frombuffer(b"".join(messages), dtype)
         if any((values[name] != value).any() for name, value in self._constants.items()):
             return None
-        return {name: self._column(values, name, places) for name, places in self._columns.items()}
+        return {name: self._column(values, name, texts) for name, texts in self._columns.items()}
 
-    def _column(self, values: NDArray[Any], name: str, places: list[str] | None) -> NDArray[Any]:
-        if places is not None:
-            texts = [self._text(values, place) for place in places]
-            return np.stack(texts, axis=1) if texts else np.empty((len(values), 0), "U1")
+    def _column(self, values: NDArray[Any], name: str, texts: list[str] | None) -> NDArray[Any]:
+        if texts is not None:
+            columns = [self._text(values, text) for text in texts]
+            return np.stack(columns, axis=1) if texts else np.empty((len(values), 0), "U1")
         if name in self._texts:
             return self._text(values, name)
         return np.ascontiguousarray(values[name], values[name].dtype.newbyteorder("="))
 
-    def _text(self, values: NDArray[Any], place: str) -> NDArray[np.str_]:
-        if place not in self._places:
+    def _text(self, values: NDArray[Any], name: str) -> NDArray[np.str_]:
+        if name not in self._formats:
             return np.full(len(values), "")
-        raw = values[place]
+        raw = values[name]
         if (raw == raw[0]).all():  # as the names of frames
             return np.full(len(values), raw[0].decode())
         return np.char.decode(raw, "utf-8")
@@ -127,9 +127,9 @@ class Layout:
                 self._string(name)
                 self._texts.add(name)
             else:
-                self._columns[name] = places = [f"{name}[{index}]" for index in range(self._possible(count))]
-                for place in places:
-                    self._string(place)
+                self._columns[name] = texts = [f"{name}[{index}]" for index in range(self._possible(count))]
+                for text in texts:
+                    self._string(text)
         elif field.type in PRIMITIVES:
             raise RecordingError(f"{name}: values of type {field.type} cannot be read")
         elif count is None:
@@ -145,13 +145,13 @@ class Layout:
         else:
             self._align(size)
         kind = self._order + code
-        self._places[name] = (kind if count is None else (kind, (self._possible(count),)), self._offset)
+        self._formats[name] = (kind if count is None else (kind, (self._possible(count),)), self._offset)
         self._offset += size * (1 if count is None else count)
 
     def _string(self, name: str) -> None:
         length = self._length(name)
         if length > 1:
-            self._places[name] = (f"S{length - 1}", self._offset)
+            self._formats[name] = (f"S{length - 1}", self._offset)
         self._offset += self._possible(length)
 
     def _length(self, name: str) -> int:
@@ -161,7 +161,7 @@ class Layout:
             (length,) = struct.unpack_from(f"{self._order}I", self._sample, self._offset)
         except struct.error:
             raise RecordingError(f"a message ends before its field {name}") from None
-        self._places[f"#{name}"] = (f"{self._order}u4", self._offset)
+        self._formats[f"#{name}"] = (f"{self._order}u4", self._offset)
         self._constants[f"#{name}"] = length
         self._offset += 4
         return int(length)
@@ -234,7 +234,7 @@ def decode(schema: Schema, definitions: Definitions, root: str, messages: Sequen
     -------
     dict of str to ndarray
         By names such as `position.x` or `rotors[0].flap`. Numbers and texts have shape (n,), lists of them (n, length);
-        where the length of a list varies, an array of n arrays. Of a list of messages each place is a column; a
+        where the length of a list varies, an array of n arrays. Of a list of messages each index is a column; a
         message that has fewer leaves NaN, or None where there is no NaN.
 
     Raises

@@ -54,7 +54,7 @@ class Field:
     count : int or None
         None for a single value, the length of a fixed array, SEQUENCE for one of any length.
     units : tuple of str
-        What stands in brackets in the comment right above the field or behind it.
+        The text in brackets in the comment right above the field or behind it.
     """
 
     name: str
@@ -176,7 +176,7 @@ class Units:
     """Units of the fields of a message type by their flattened names.
 
     A field of a nested message that has no unit of its own has that of the field that holds it: the unit in the comment
-    there, or the one in its place if there are as many as the nested message has fields (force [N] and torque [N m]).
+    there, or the one at its index if there are as many as the nested message has fields (force [N] and torque [N m]).
     """
 
     def __init__(self, definitions: Definitions, root: str) -> None:
@@ -190,8 +190,8 @@ class Units:
 
     def _collect(self, kind: str, prefix: str, inherited: tuple[str, ...]) -> None:
         fields = self._definitions.get(kind, ())
-        for place, field in enumerate(fields):
-            units = field.units or (inherited[place : place + 1] if len(inherited) == len(fields) else inherited[:1])
+        for index, field in enumerate(fields):
+            units = field.units or (inherited[index : index + 1] if len(inherited) == len(fields) else inherited[:1])
             if field.type in PRIMITIVES:
                 unit = units[0] if units else ""
                 self._units[prefix + field.name] = _KNOWN_UNITS.get((kind, field.name), unit)

@@ -133,7 +133,7 @@ def _by_role(identity: str, channels: list[Channel]) -> FlightTopics:
 
 
 def _by_type(identity: str, channels: list[Channel], schemas: Mapping[int, Schema]) -> Iterator[FlightTopics]:
-    """One flight for each topic with states, and for each the topics of the other types that stand beside it."""
+    """One flight for each topic with states, and for each the topics of the other types in its namespace."""
     topics: dict[str, dict[str, list[int]]] = {role: {} for role in TYPES}
     for channel in channels:
         kind = schemas.get(channel.schema_id)

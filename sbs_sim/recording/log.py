@@ -82,7 +82,7 @@ class Topic(Mapping[str, NDArray[Any]]):
             if values.ndim == 1:
                 columns[name] = values
             else:
-                columns.update({f"{name}[{place}]": values[:, place] for place in range(values.shape[1])})
+                columns.update({f"{name}[{i}]": values[:, i] for i in range(values.shape[1])})
         return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
 
     @cached_property

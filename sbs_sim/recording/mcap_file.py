@@ -78,7 +78,7 @@ class FileBuilder:
         self.channels: dict[int, Channel] = {}
         self._crc = 0
         self._defined = 0
-        self._in_chunks: tuple[set[int], set[int]] = set(), set()  # schemas and channels whose definitions stand in one
+        self._in_chunks: tuple[set[int], set[int]] = set(), set()  # schemas and channels whose definitions are in one
         self._definitions_due = 0
         self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
         self._counts: defaultdict[int, int] = defaultdict(int)

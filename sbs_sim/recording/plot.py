@@ -236,7 +236,7 @@ def _coordinates(field: str, names: tuple[str, ...]) -> Callable[[Log], Curves]:
 
 
 PANELS: dict[str, Callable[[Log], Curves]] = {
-    "place [m]": _height,
+    "position [m]": _height,
     "velocity [m/s]": _vector("state", "velocity", "uvw"),
     "attitude [deg]": _attitude,
     "rates [deg/s]": _vector("state", "angular_velocity", "pqr", np.degrees(1.0)),

@@ -105,7 +105,7 @@ def scan(source: Source, take: Callable[[Content], None]) -> Scan:
     elif summary is not None:
         found.complete = _nothing_missing(summary, found)
     if found.unlisted:
-        found.reasons.append(f"{found.unlisted} more places like these")
+        found.reasons.append(f"{found.unlisted} more reasons like these")
     if summary is None:
         closed = data_end or (source.size >= len(MAGIC) and source.at(source.size - len(MAGIC), len(MAGIC)) == MAGIC)
         found.reasons.append("the summary is damaged" if closed else "the recording was not closed: it has no end")

@@ -24,7 +24,7 @@ class Parser(argparse.ArgumentParser):
     name : str
         Of the executable.
     example : str
-        A call of it, without what stands before its name.
+        A call of it, from its name on.
     **options
         Those of ArgumentParser.
     """
@@ -36,7 +36,7 @@ class Parser(argparse.ArgumentParser):
         self.add_argument("--version", action=_Version, help="print the version of the package and end")
 
     def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
-        """Parse; options may stand between the arguments."""
+        """Parse; options may be between the arguments."""
         return self.parse_intermixed_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:

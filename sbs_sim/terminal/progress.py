@@ -8,9 +8,9 @@ from typing import Any
 
 @contextmanager
 def progress_bar(unit: str, total: float | None = None) -> Iterator[Callable[..., None] | None]:
-    """What to call with what is done and with the total, whatever stands before: a bar on stderr if that is a terminal.
+    """A function that draws progress as a bar on stderr; its last two arguments are what is done and the total.
 
-    None where it is not.
+    None if stderr is no terminal.
 
     Parameters
     ----------

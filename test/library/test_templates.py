@@ -70,8 +70,8 @@ def is_told(kind, data):
     text = message_definition(name, lambda package, place: Path(get_package_share_directory(package)) / place)
     layout = Layout(parse(root, text), root, data)
     told = np.zeros(len(data), bool)
-    for form, place in layout._places.values():
-        told[place : place + np.dtype(form).itemsize] = True
+    for form, offset in layout._formats.values():
+        told[offset : offset + np.dtype(form).itemsize] = True
     return told
 
 
@@ -154,7 +154,7 @@ def big_endian(message):
 
 
 def four_more(message):
-    """Numbers at other places than multiples of their size."""
+    """Numbers at other offsets than multiples of their size."""
     data = serialize_message(message)
     return data[:4] + bytes(4) + data[4:]
 
@@ -163,7 +163,7 @@ def four_more(message):
     ("other", "reason"),
     [
         (big_endian, "BodyState: messages begin 00 00 00 00, 00 01 00 00 is understood"),
-        (four_more, "is at 0 places of the serialised message, 1 is understood"),
+        (four_more, "is at 0 offsets of the serialised message, 1 is understood"),
     ],
 )
 def test_where_messages_are_laid_out_otherwise_ros_serialises_them_and_it_is_told(monkeypatch, other, reason):
@@ -194,7 +194,7 @@ def test_a_number_that_is_there_twice_is_refused(monkeypatch):
 
     monkeypatch.setattr(templates, "serialize_message", twice)
     monkeypatch.setattr(templates, "deserialize_message", lambda data, kind: kind())
-    with pytest.raises(LayoutError, match=r"^Vector3: x is at 2 places"):
+    with pytest.raises(LayoutError, match=r"^Vector3: x is at 2 offsets"):
         Template(Vector3(), {"x": DOUBLE})
 
 

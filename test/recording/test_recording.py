@@ -746,7 +746,7 @@ def test_a_long_list_of_damages_is_cut(tmp_path):
     assert not found.complete
     assert len(places) > 150
     assert len(found.reasons) == 101
-    assert found.reasons[-1] == f"{len(places) - 100} more places like these"
+    assert found.reasons[-1] == f"{len(places) - 100} more reasons like these"
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"no recording\n" * 1000, bytes(5000)])

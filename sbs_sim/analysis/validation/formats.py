@@ -62,7 +62,7 @@ def aims(case: Case) -> list[str]:
 
 
 def paragraphs(case: Case) -> list[tuple[str, str]]:
-    """What stands around the table of a case: labels and texts."""
+    """What is printed around the table of a case: labels and texts."""
     return [
         ("Source", case.source),
         ("Model", case.statement),
@@ -72,7 +72,7 @@ def paragraphs(case: Case) -> list[tuple[str, str]]:
 
 
 def remarks(case: Case) -> list[tuple[str, str]]:
-    """What stands below the table of a case."""
+    """What is printed below the table of a case."""
     return [("Remark", text) for text in case.remarks]
 
 

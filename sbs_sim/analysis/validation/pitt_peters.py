@@ -40,12 +40,12 @@ def eigenmatrix(v0: float) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
-def _rates(v0: float, place: int, step: float) -> np.ndarray:
+def _rates(v0: float, index: int, step: float) -> np.ndarray:
     """What the inflow itself gives to its rates, over Omega: the loads that are held fall out of the differences."""
     sbs = craft("sbs")
     engine = points_engine(sbs.arranged(True, True, "points"))
     states = np.array([v0, 0.0, 0.0])
-    states[place] += step
+    states[index] += step
     out = engine.memory(3, 3)
     inflow_matrix(engine.model.rotors, 0, engine.lanes([states[:1]]), engine.memory(3), 1, out)
     return np.asarray(out[..., 0] @ states / sbs.rotors[0].speed)

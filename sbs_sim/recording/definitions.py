@@ -25,6 +25,7 @@ NUMBERS = {
     "float64": "f8",
 }
 PRIMITIVES = frozenset([*NUMBERS, "string", "wstring"])
+MAX_NESTING = 32  # levels of types in a type
 SEQUENCE = -1  # count of a field whose length is in the message
 SEPARATOR = "=" * 80
 
@@ -134,7 +135,13 @@ def type_hash(type_name: str, find_file: Callable[[str, str], Path]) -> str:
 
 
 def parse(type_name: str, text: str) -> Definitions:
-    """Fields of a message type and of all types in it, from the joined text of `message_definition`."""
+    """Fields of a message type and of all types in it, from the joined text of `message_definition`.
+
+    Raises
+    ------
+    RecordingError
+        A type contains itself, or types are nested deeper than MAX_NESTING.
+    """
     definitions: Definitions = {}
     name = short_name(type_name)
     for part in re.split(r"^={3,}\s*$", text, flags=re.MULTILINE):
@@ -142,7 +149,19 @@ def parse(type_name: str, text: str) -> Definitions:
         if head:
             name, part = short_name(head[1]), part[head.end() :]
         definitions[name] = fields_of(part, name.split("/")[0])
+    _check_nesting(definitions, short_name(type_name), [], set())
     return definitions
+
+
+def _check_nesting(definitions: Definitions, kind: str, outer: list[str], checked: set[str]) -> None:
+    """Raise RecordingError for a type that contains itself, or is nested too deep in the outer ones."""
+    if kind in outer:
+        raise RecordingError(f"message type {kind} contains itself")
+    if len(outer) > MAX_NESTING:
+        raise RecordingError(f"message type {outer[0]} has more than {MAX_NESTING} levels of types in it")
+    for inner in {field.type for field in definitions.get(kind, ())} - PRIMITIVES - checked:
+        _check_nesting(definitions, inner, [*outer, kind], checked)
+    checked.add(kind)
 
 
 def fields_of(text: str, package: str) -> tuple[Field, ...]:

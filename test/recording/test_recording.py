@@ -349,7 +349,7 @@ def test_rosbag2_finds_its_metadata(flight):
     assert topics["/never"]["message_count"] == 0
 
 
-def test_what_the_summary_names_stands_before_it(tmp_path):
+def test_what_the_summary_names_is_before_it(tmp_path):
     """A topic that came after the last message too; only topics with messages have a number of them."""
     path = tmp_path / "late.mcap"
     with new_log(path) as log:
@@ -357,7 +357,7 @@ def test_what_the_summary_names_stands_before_it(tmp_path):
         log.write(first, 0, number_message(1))
         wait_until(lambda: log.written == 1)
         add_number(log, "/late")
-        log.add_channel("/other", "test_msgs/msg/Other", "int8 value", "", type_hash="RIHS01_00", role="other")
+        log.add_channel("/strange", "test_msgs/msg/Strange", "int8 value", "", type_hash="RIHS01_00", role="other")
     with path.open("rb") as file:
         records = list(StreamReader(file, validate_crcs=True).records)
     names = [type(record).__name__ for record in records]
@@ -433,7 +433,7 @@ def test_a_log_has_metadata_and_attachments(flight):
     assert log.attachments == {"sbs.yaml": b"mass: 1\n", "empty": b""}
 
 
-def test_what_a_log_has_not_is_told_with_what_it_has(flight):
+def test_a_missing_topic_is_reported_with_those_that_there_are(flight):
     log = read(flight[0])
     with pytest.raises(KeyError, match=r"no topic 'speed'; there are /state, /rotors"):
         log["speed"]
@@ -574,6 +574,12 @@ def test_the_other_byte_order_is_read_too():
     assert Layout(definitions, "test_msgs/Number", message).decode([message, number_message(2.5)]) is None
 
 
+def chain(count):
+    """Definitions of that many types, each in the one before it."""
+    parts = ["T0 first", *(f"MSG: test_msgs/T{i}\nT{i + 1} next" for i in range(count))]
+    return f"\n{'=' * 80}\n".join(parts)
+
+
 @pytest.mark.parametrize(
     ("data", "text", "complaint"),
     [
@@ -583,6 +589,8 @@ def test_the_other_byte_order_is_read_too():
         (b"\0\1\0\0" + bytes(4), "string a\nstring b", "a message ends before its field b"),
         (number_message(1.0), "wstring text", "text: values of type wstring cannot be read"),
         (number_message(1.0), "Other text", "there is no definition of test_msgs/Other"),
+        (number_message(1.0), "Strange itself", "message type test_msgs/Strange contains itself"),
+        (number_message(1.0), chain(500), "message type test_msgs/Strange has more than 32 levels of types in it"),
         (b"\0\7\0\0" + bytes(8), NUMBER, "messages in plain CDR can be read, this one begins 00 07 00 00"),
         (b"", NUMBER, "this one begins $"),
     ],
@@ -590,9 +598,9 @@ def test_the_other_byte_order_is_read_too():
 def test_messages_that_are_not_what_they_should_be(tmp_path, data, text, complaint):
     path = tmp_path / "log.mcap"
     with new_log(path) as log:
-        log.write(log.add_channel("/odd", "test_msgs/msg/Odd", text, ""), 0, data)
-    topic = read(path)["odd"]
-    with pytest.raises(RecordingError, match=f"^topic /odd: .*({complaint})"):
+        log.write(log.add_channel("/strange", "test_msgs/msg/Strange", text, ""), 0, data)
+    topic = read(path)["strange"]
+    with pytest.raises(RecordingError, match=f"^topic /strange: .*({complaint})"):
         topic["value"]
 
 
@@ -602,7 +610,7 @@ def test_pandas_is_asked_for_politely(flight, monkeypatch):
         read(flight[0])["state"].to_pandas()
 
 
-def test_a_pandas_frame_has_a_column_for_every_place_of_a_list(flight, monkeypatch):
+def test_a_pandas_frame_has_a_column_for_every_index_of_a_list(flight, monkeypatch):
     """With a stand-in for pandas, which is no part of the environment."""
     stand_in = types.ModuleType("pandas")
     stand_in.Index = lambda values, name: (name, values)
@@ -686,8 +694,8 @@ def test_topics_without_type_and_with_several_publishers(tmp_path):
         writer = Writer(file)
         writer.start(profile="ros2", library="other")
         schema = writer.register_schema("test_msgs/msg/Number", "ros2msg", NUMBER.encode())
-        odd = {"offered_qos_profiles": "[: no YAML"}
-        channels = [writer.register_channel("/number", "cdr", schema, metadata) for metadata in ({}, odd)]
+        strange_metadata = {"offered_qos_profiles": "[: no YAML"}
+        channels = [writer.register_channel("/number", "cdr", schema, metadata) for metadata in ({}, strange_metadata)]
         text = writer.register_channel("/text", "json", 0)
         for number in range(10):
             writer.add_message(channels[number % 2], number, number_message(number), number)
@@ -813,7 +821,7 @@ OTHER_KINDS = {
 
 
 @pytest.mark.parametrize("name", OTHER_KINDS)
-def test_bags_of_other_kinds_are_told_what_to_do_with(all_bags, name):
+def test_for_bags_of_other_kinds_the_message_says_what_to_do(all_bags, name):
     path = all_bags / name
     folder = path if path.is_dir() else path.parent
     expected = OTHER_KINDS[name].format(folder, path).replace("--src {}", f"--src {folder}")
@@ -885,7 +893,7 @@ def test_a_role_finds_its_topic_however_it_is_called(tmp_path):
             log.write(add_number(log, topic, role=role), 0, number_message(value))
     log = read(path)
     assert [log[name]["value"][0] for name in ("state", "/state", "rotors", "/x/y", "x/y")] == [1, 2, 2, 1, 1]
-    assert log.roles == {"state": "/x/y", "rotors": "/state"}  # the two others cannot be told apart
+    assert log.roles == {"state": "/x/y", "rotors": "/state"}  # the two others cannot be distinguished
     assert log.flights == (log,)
     assert log.flight() is log
     assert log.flight(1) is log
@@ -897,7 +905,7 @@ def test_a_role_finds_its_topic_however_it_is_called(tmp_path):
 
 
 @pytest.mark.parametrize("names", [("/h1", "/h2"), ("", "")])
-def test_flights_in_one_file_are_told_apart(tmp_path, names):
+def test_flights_in_one_file_are_distinguished(tmp_path, names):
     """By their numbers, in the order in which they began; what belongs to none belongs to each."""
     late = flight_log(tmp_path / "late.mcap", names[0], 2, 2_000_000_000)
     early = flight_log(tmp_path / "early.mcap", names[1], 1, 1_000_000_000)
@@ -968,8 +976,8 @@ def test_topics_of_logs_that_do_not_say_what_they_are_are_found_by_type(tmp_path
 
 
 @pytest.mark.parametrize("names", [("/h1", "/h2"), ("", "")])
-def test_older_logs_in_one_file_are_told(tmp_path, names):
-    """They had no identity: whose the metadata are cannot be told, nor what is whose on one topic."""
+def test_older_logs_in_one_file_are_reported(tmp_path, names):
+    """They had no identity: it is not known to which flight metadata and messages of one topic belong."""
     paths = [tmp_path / "0.mcap", tmp_path / "1.mcap"]
     for i, path in enumerate(paths):
         start = {"library": "sbs_sim 0", "wall_start_ns": str(i)}
@@ -1060,7 +1068,7 @@ def test_playing_begins_at_once_and_ends_before_a_damage(original, tmp_path):
     assert later == whole[-len(later) :]
 
 
-def test_what_is_not_whole_is_not_played(original, tmp_path):
+def test_an_incomplete_log_is_not_played(original, tmp_path):
     path = tmp_path / "cut.mcap"
     path.write_bytes(original.data[:-30_000])
     with pytest.raises(RecordingError, match=r"cut.mcap is incomplete \(.*: `replay --recover"):
@@ -1100,7 +1108,7 @@ def test_many_messages_are_put_into_chunks_of_a_handy_size(tmp_path):
 
 
 class SlowDisk:
-    """Makes every write after the first wait until it is told to go on."""
+    """Makes every write after the first wait until it may go on."""
 
     def __init__(self, monkeypatch):
         self.go_on = threading.Event()
@@ -1122,9 +1130,9 @@ def test_a_slow_disk_never_blocks_and_what_is_dropped_is_counted(tmp_path, monke
     channel = add_number(log)
     assert log.write(channel, 0, number_message(0))
     assert disk.waiting.wait(10)
-    begun = time.monotonic()
+    begin = time.monotonic()
     taken = [log.write(channel, number, number_message(number)) for number in range(1, 301)]
-    assert time.monotonic() - begun < 1.0
+    assert time.monotonic() - begin < 1.0
     assert taken == [True] * 100 + [False] * 200
     assert (log.dropped, log.written) == (200, 0)
     disk.go_on.set()
@@ -1197,7 +1205,7 @@ def test_a_patient_writer_is_let_go_at_the_end(tmp_path, monkeypatch):
     assert read(log.path).complete
 
 
-def test_a_gap_in_the_sequence_tells_of_dropped_messages(tmp_path, monkeypatch):
+def test_a_gap_in_the_sequence_shows_dropped_messages(tmp_path, monkeypatch):
     disk = SlowDisk(monkeypatch)
     log = new_log(tmp_path / "log.mcap", queue_length=5)
     channel = add_number(log)
@@ -1272,7 +1280,7 @@ def test_what_cannot_be_recorded_is_refused(tmp_path):
     assert not (tmp_path / "other.mcap").exists()
 
 
-def test_a_log_that_is_deleted_is_told_at_once(tmp_path):
+def test_a_deleted_log_is_reported_at_once(tmp_path):
     """Though nothing is written any more."""
     log = new_log(tmp_path / "a.mcap")
     number = add_number(log)
@@ -1289,7 +1297,7 @@ def test_a_log_that_is_deleted_is_told_at_once(tmp_path):
 
 
 @pytest.mark.parametrize("how", ["replaced", "overwritten", "cut", "its folder deleted"])
-def test_a_log_that_is_replaced_is_told_and_the_other_file_stays(tmp_path, how):
+def test_a_log_that_is_replaced_is_reported_and_the_other_file_stays(tmp_path, how):
     folder = tmp_path / "folder"
     folder.mkdir()
     path, other = folder / "a.mcap", tmp_path / "other"
@@ -1511,7 +1519,7 @@ def test_lengths_beyond_all_bounds_do_not_take_all_memory(tmp_path, original):
         resource.setrlimit(resource.RLIMIT_AS, limits)
 
 
-def test_damage_to_what_is_not_needed_is_told_and_costs_nothing(tmp_path, original):
+def test_damage_to_what_is_not_needed_is_reported_and_costs_nothing(tmp_path, original):
     """The name of the program in the header, and times in a message index."""
     (_, end), *_ = sorted(original.chunks)
     for place in (original.data.index(b"crash_recording"), end + 9 + 6 + 3):
@@ -1535,7 +1543,7 @@ def test_the_definitions_survive_the_first_chunk(tmp_path, original):
     assert "values" in read(path)["t16"]
 
 
-def test_a_recovered_file_is_whole_and_says_what_it_was(tmp_path, flight):
+def test_a_recovered_file_is_complete_and_says_what_was_wrong(tmp_path, flight):
     path, sent = flight
     broken, output = tmp_path / "broken.mcap", tmp_path / "output.mcap"
     broken.write_bytes(path.read_bytes()[:-50_000])
@@ -1557,7 +1565,7 @@ def test_a_recovered_file_is_whole_and_says_what_it_was(tmp_path, flight):
     assert set(found) <= set(sent)
 
 
-def test_a_whole_file_is_recovered_whole(tmp_path, flight):
+def test_a_complete_file_is_recovered_completely(tmp_path, flight):
     path, sent = flight
     before = path.read_bytes()
     recovery = recover(path, tmp_path / "output.mcap")

@@ -118,8 +118,8 @@ class Taker:
         for data in self._client:
             self._bytes += len(data) if self._pictures else 0  # not the scene, which comes first
             size = int.from_bytes(data[8:16], "little")
-            told = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
-            messages = msgspec.msgpack.decode(told)["messages"]
+            sent = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
+            messages = msgspec.msgpack.decode(sent)["messages"]
             if any(one.get("name") == BLADES and "batched_wxyzs" in one.get("updates", {}) for one in messages):
                 self._pictures.append(time.monotonic())
 

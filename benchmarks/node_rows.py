@@ -254,7 +254,7 @@ def log_rows(watch: Watch, count: int = 20) -> list[Row]:
         begins.append(asked(True))
         time.sleep(1.0)
     return [
-        ("node: log begun in flight p50", float(np.median(begins)), "ms", f"longest {max(begins):.0f} ms"),
+        ("node: log started in flight p50", float(np.median(begins)), "ms", f"longest {max(begins):.0f} ms"),
         ("node: deadlines missed meanwhile", watch.status.missed_deadlines - missed, "", f"{count} ends and begins"),
     ]
 

@@ -84,8 +84,8 @@ def main() -> None:
     print(f"{'':14}" + "".join(f"{name:>28}" for name in found))
     for i, (method, degrees) in enumerate(STEPS):
         cells = [rows[i] for rows in found.values()]
-        told = [f"{note.split('body ')[1].replace(' all states', '')} x{factor:.0f}" for _, factor, _, note in cells]
-        print(f"{method:6}{degrees:5g} deg" + "".join(f"{text:>28}" for text in told))
+        texts = [f"{note.split('body ')[1].replace(' all states', '')} x{factor:.0f}" for _, factor, _, note in cells]
+        print(f"{method:6}{degrees:5g} deg" + "".join(f"{text:>28}" for text in texts))
 
 
 if __name__ == "__main__":

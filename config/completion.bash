@@ -53,7 +53,7 @@ _sbs_sim_words() {
     COMPREPLY=($(compgen -W "$1" -- "$2"))
 }
 
-# What may follow an option, or stand as the first argument: words, or what a mark stands for.
+# What may follow an option, or be the first argument: words, or what a mark represents.
 _sbs_sim_value() {
     local word=$2
     case $1 in

@@ -33,7 +33,7 @@ _sbs_sim_words() {
     COMPREPLY=($(compgen -W "$1" -- "$2"))
 }
 
-# What may follow an option, or stand as the first argument: words, or what a mark stands for.
+# What may follow an option, or be the first argument: words, or what a mark represents.
 _sbs_sim_value() {
     local word=$2
     case $1 in
@@ -114,7 +114,7 @@ def paths(schema: dict[str, Any], path: str = "") -> Iterator[str]:
 
 
 def follows(parser: argparse.ArgumentParser, name: str) -> Iterator[tuple[str, str]]:
-    """What may follow the options of an executable, and what may stand as its first argument."""
+    """What may follow the options of an executable, and what may be its first argument."""
     for action in parser._actions:
         if action.help == argparse.SUPPRESS or action.nargs == 0:
             continue
@@ -144,7 +144,7 @@ def function(name: str, cases: dict[str, str]) -> str:
 
 
 def text() -> str:
-    """The whole file."""
+    """The complete file."""
     modules = reference.executables()
     parsers = {name: reference.parser_of(module) for name, module in modules.items()}
     known = {name: getattr(importlib.import_module(module), "PARAMETERS", {}) for name, module in modules.items()}

@@ -21,7 +21,7 @@ HEADER = {
 
 
 def text() -> str:
-    """The whole file."""
+    """The complete file."""
     return json.dumps({**HEADER, **schema_of(Description)}, indent=2) + "\n"
 
 

@@ -62,7 +62,7 @@ def table(headings: list[str], rows: list[list[str]]) -> str:
 
 
 def page(title: str, *parts: str) -> str:
-    """A whole page."""
+    """A complete page."""
     return "\n\n".join([f"# {title}", NOTE, *(part.strip("\n") for part in parts if part.strip())]) + "\n"
 
 
@@ -86,7 +86,7 @@ class Entry:
 
 @dataclass
 class Part:
-    """What stands above a field or between two lines of dashes: a message, request, answer ..."""
+    """The comment above a field or between two lines of dashes: a message, request, answer ..."""
 
     comment: list[str] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
@@ -264,7 +264,7 @@ Ctrl-C 130 where there is something to be cut short. Each has `--version`, and `
 services and parameters. Executables without a command line of their own take ROS arguments: their parameters are in
 [Parameters](parameters.md). Outside of ROS the package brings one command for all of them, `sbs-sim NAME`.
 
-The same words stand for the same things everywhere: `--set PATH=VALUE` changes the aircraft, `--out` is where the main
+The same options mean the same everywhere: `--set PATH=VALUE` changes the aircraft, `--out` is where the main
 result goes, `--csv` and `--json` hold it all in SI units and radians. Angles are typed in degrees, their names end in
 `deg`; parameters, messages and services of ROS are in radians, as REP 103 has it, but for those that end in `_deg`.
 """

@@ -2,7 +2,7 @@
 
     ./run python tools/update_theory.py
 
-replaces what stands between the two `reproduction` comments of the page; all else stays as it is. That takes some ten
+replaces the text between the two `reproduction` comments of the page; all else stays as it is. That takes some ten
 seconds.
 """
 
@@ -108,12 +108,12 @@ def forward_flight(flights: Mapping[str, Sweep]) -> list[str]:
     return [*lines, ""]
 
 
-def trimmed(flight: Sweep, place: int) -> str:
+def trimmed(flight: Sweep, index: int) -> str:
     """Pitch and longitudinal cyclic of one trim [deg], and whether controls are beyond their limits."""
-    point = flight.points[place].trim
+    point = flight.points[index].trim
     if point is None:
         return "no trim"
-    angles = (round(math.degrees(flight[name][place]), 1) + 0.0 for name in ("pitch", "longitudinal_cyclic"))
+    angles = (round(math.degrees(flight[name][index]), 1) + 0.0 for name in ("pitch", "longitudinal_cyclic"))
     return ", ".join(f"{angle:.1f}" for angle in angles) + (" (beyond limits)" if point.beyond_limits else "")
 
 
@@ -138,7 +138,7 @@ def main() -> None:
     """Update the page."""
     page = PAGE.read_text(encoding="utf-8")
     if page.count(BEGIN) != 1 or page.count(END) != 1:
-        raise SystemExit(f"{PAGE}: {BEGIN} and {END} must stand there once each")
+        raise SystemExit(f"{PAGE}: {BEGIN} and {END} must occur there once each")
     inside = f"{BEGIN}\n\n{markdown(reproduce())}\n\n{END}"
     PAGE.write_text(re.sub(f"{BEGIN}.*{END}", lambda _: inside, page, flags=re.DOTALL), encoding="utf-8")
 

@@ -86,7 +86,7 @@ class Batch(ByContent):
     histories : dict of str to ndarray
         What was asked for, by name, each with the shape (n_flights, n_rows, ...); see `simulate_batch`.
     errors : tuple of str or None
-        Of each flight, why it ended early or did not begin, in one line; None for a whole flight. "cancelled" for
+        Of each flight, why it ended early or did not begin, in one line; None for a complete flight. "cancelled" for
         what was not started.
     warnings : tuple of tuple of str
         Of each flight, where the model does not hold and what actuators would not do, see
@@ -180,7 +180,7 @@ def simulate_batch(
         What to keep of "state" (n_flights, n_rows, n_states), "controls" (..., n_controls), "swashplate"
         (..., n_rotors, 3), "acceleration" (..., 3), "thrust", "torque", "power" (..., n_rotors), and of single states
         by their names (n_flights, n_rows). The four loads and accelerations take a derivative for every row. Aircraft
-        with fewer rotors or other states have NaN in their places.
+        with fewer rotors or other states have NaN there.
     lead_lag, cyclic_inflow, azimuth_count :
         Fidelity of the flights, and of the trims from which they start; see `sbs_sim.trim`.
     workers : int, optional

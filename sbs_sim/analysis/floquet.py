@@ -99,7 +99,7 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
 
 
 def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
-    """Shortest time in which every rotor passes a whole number of blades [s], and those numbers.
+    """Shortest time in which every rotor passes an integer number of blades [s], and those numbers.
 
     The differential coordinate of an even number of blades changes its sign with every blade: such a rotor passes an
     even number. One whose blades differ passes all of them.

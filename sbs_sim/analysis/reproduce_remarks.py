@@ -42,7 +42,7 @@ _TWO_CONINGS = (
 _TILT = "reading: the tilt that the gyroscopic moment gives goes with the flap inertia, which is larger in the paper's"
 _TABLE4 = (
     "artefact: Table 4 breaks the axisymmetry that a rotor has in hover: it damps pitch 1.5 times as much as roll,"
-    f" which no sound model does; ours stand beside it ({SECTION})"
+    f" which no physical model does; our values are beside it ({SECTION})"
 )
 _FIRST_MATRIX = (
     "artefact: a pole of the first matrix of eq. [32] alone, which holds no load; the complete system's rotor poles are"

@@ -263,8 +263,8 @@ def sweep(
     Raises
     ------
     SweepError
-        No values, one that is not finite, an unknown parameter, or one that is given a single value too; no whole
-        number of workers.
+        No values, one that is not finite, an unknown parameter, or one that is given a single value too; a number of
+        workers that is no integer.
     TrimError
         A condition or fidelity out of range, or a guess that is none.
     ClusterError

@@ -1,1 +1,1 @@
-"""Flight in time: simulations, whole flights, and what flies them."""
+"""Flight in time: simulations, and complete flights under commands."""

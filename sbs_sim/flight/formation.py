@@ -198,7 +198,7 @@ def _plan(one: Simulation, count: int, ticks: int, every: int, loaded: bool) -> 
 
 
 def _rows(one: Simulation, plan: _Plan, angles: Array, states: Array, forces: Array, loads: Array) -> Rows:
-    """Instants of a flight; specific forces stand for accelerations."""
+    """Instants of a flight; accelerations are specific forces here."""
     return Rows(
         step=plan.steps,
         time=np.multiply(plan.steps, one.step_size, dtype=float),

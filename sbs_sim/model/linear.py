@@ -116,7 +116,7 @@ def evaluate_inputs(derivative, model, inputs, rigging, work, tick):
 
 @kernel
 def set_state(point, x, seen):
-    """Simulation state at the origin, heading north, of a linear state; what stands from `seen` on is zero."""
+    """Simulation state at the origin, heading north, of a linear state; states from `seen` on are zero."""
     cp, sp = cosine_sine(0.5 * point[S.LINEAR_THETA])
     cr, sr = cosine_sine(0.5 * point[S.LINEAR_PHI])
     S.set_vector(x, S.POSITION, Vector(0.0, 0.0, 0.0))

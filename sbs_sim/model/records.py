@@ -122,7 +122,7 @@ DRIVE = {
     "speed": LANES,  # of the first rotor in the file [rad/s]
     "inertia": LANES,  # I_t
     "momentum": VECTOR,  # I_t a, body axes
-    "drag": LANES,  # torque of the engine that stands still, over the speed [N m s]
+    "drag": LANES,  # torque of the stopped engine, over the speed [N m s]
     "max_torque": LANES,
     "max_power": LANES,
     "inverse_lag": LANES,  # 1/s

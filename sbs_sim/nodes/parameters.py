@@ -71,7 +71,7 @@ def _declare_one(node: Node, name: str, parameter: Parameter, given: dict[str, R
 
 
 def _as_wanted(value: Any, default: Any) -> Any:
-    """Whole numbers where numbers are wanted, 15 is as good as 15.0; and the word that YAML takes for a false."""
+    """Integers where numbers are wanted, 15 is as good as 15.0; and the word that YAML takes for a false."""
     if isinstance(default, str) and value is False:
         return "off"
     if isinstance(default, float) and type(value) is int:

@@ -12,7 +12,7 @@ from sbs_sim.errors import ExportError
 
 
 def write(path: str | Path, content: bytes | str) -> None:
-    """Write a file, whole or not at all; a text in UTF-8. An older one is replaced, devices and pipes are written to.
+    """Write a complete file, or none; a text in UTF-8. An older one is replaced, devices and pipes are written to.
 
     Raises
     ------

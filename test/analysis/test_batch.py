@@ -220,18 +220,18 @@ def test_no_flights_and_unknown_outputs_are_refused(sbs, hover):
         simulate_batch([Case(sbs, hover)], 1.0, outputs=["U"])
 
 
-def test_progress_is_told_and_a_batch_can_be_cancelled(sbs, hover):
-    told = []
+def test_progress_is_reported_and_a_batch_can_be_cancelled(sbs, hover):
+    reported = []
     batch = simulate_batch(
         [Case(sbs, hover)] * 40,
         DURATION,
         workers=1,
-        progress=lambda i, done, total: told.append((i, done, total, threading.current_thread())),
-        cancelled=lambda: len(told) >= 2,
+        progress=lambda i, done, total: reported.append((i, done, total, threading.current_thread())),
+        cancelled=lambda: len(reported) >= 2,
     )
-    ended = [i for i, *_ in told]
-    assert 2 <= len(told) < 40
-    assert told == [(i, k + 1, 40, threading.main_thread()) for k, i in enumerate(ended)]
+    ended = [i for i, *_ in reported]
+    assert 2 <= len(reported) < 40
+    assert reported == [(i, k + 1, 40, threading.main_thread()) for k, i in enumerate(ended)]
     assert [error is None for error in batch.errors] == [i in ended for i in range(40)]
     assert set(batch.errors) == {None, CANCELLED}
 

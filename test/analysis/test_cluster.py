@@ -58,15 +58,15 @@ def assert_same(one, other):
 def test_a_sweep_is_the_same_when_a_worker_is_killed_half_way(sbs, address):
     values = [*np.linspace(-4.0, 20.0, 15), 500.0]  # the last has no trim
     victims = list(workers_of(address).values())
-    told = []
+    reported = []
 
     def progress(point, done, total):
-        told.append((done, total))
+        reported.append((done, total))
         if done == 4:
             os.kill(victims[0], signal.SIGKILL)
 
     far = sweep(sbs, "airspeed", values, dask=address, progress=progress)
-    assert told == [(i + 1, 16) for i in range(16)]
+    assert reported == [(i + 1, 16) for i in range(16)]
     assert len(far.failed) == 1
     assert_same(far, sweep(sbs, "airspeed", values))
     assert victims[0] not in workers_of(address).values()
@@ -95,17 +95,17 @@ def test_a_batch_is_the_same_and_needs_no_files_of_the_aircraft(custom, cluster)
 
 
 def test_a_sweep_on_a_cluster_can_be_cancelled(sbs, address):
-    told = []
+    reported = []
     found = sweep(
         sbs,
         "airspeed",
         np.linspace(0.0, 20.0, 40),
         dask=address,
-        progress=lambda point, *_: told.append(point.value),
-        cancelled=lambda: len(told) >= 2,
+        progress=lambda point, *_: reported.append(point.value),
+        cancelled=lambda: len(reported) >= 2,
     )
-    assert 2 <= len(told) < 40
-    assert [point.value for point in found.points if point.error is None] == sorted(told)
+    assert 2 <= len(reported) < 40
+    assert [point.value for point in found.points if point.error is None] == sorted(reported)
     assert {point.error for point in found.points} == {None, "cancelled"}
 
 
@@ -133,7 +133,7 @@ def test_a_worker_with_other_versions_is_refused_by_name(address, other, said):
     assert len(str(error)) < 240
 
 
-def test_an_address_where_nobody_answers_is_told_in_one_line(sbs):
+def test_an_address_where_nobody_answers_is_reported_in_one_line(sbs):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # it does not listen
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"

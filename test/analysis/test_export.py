@@ -1,4 +1,4 @@
-"""Linear models and trims as files and for other programs: everything arrives, and what cannot be written is told."""
+"""Linear models and trims as files and for other programs: everything arrives, what cannot be written is reported."""
 
 import json
 import math
@@ -118,7 +118,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("name", "reason"), REFUSED.values(), ids=REFUSED)
-def test_a_file_that_cannot_be_written_is_told_in_one_line(model, tmp_path, name, reason):
+def test_a_file_that_cannot_be_written_is_reported_in_one_line(model, tmp_path, name, reason):
     (tmp_path / "file.json").write_text("")
     (tmp_path / "folder.json").mkdir()
     with pytest.raises(ExportError) as caught:
@@ -135,13 +135,13 @@ def test_a_folder_that_may_not_be_written_to(model, tmp_path):
         model.save(tmp_path / "model.npz")
 
 
-def test_a_full_disk_is_told():
+def test_a_full_disk_is_reported():
     with pytest.raises(ExportError, match="/dev/full: cannot be written: No space left on device"):
         write("/dev/full", "text")
 
 
 @pytest.mark.parametrize("before", [None, "old"])
-def test_a_file_is_written_whole_or_not_at_all(tmp_path, before):
+def test_a_file_is_written_completely_or_not_at_all(tmp_path, before):
     """On a disk that takes a part of it only."""
     path = tmp_path / "a.json"
     if before is not None:
@@ -159,7 +159,7 @@ write({str(path)!r}, "x" * 2000)
     )
 
 
-def test_a_replaced_file_keeps_its_place_and_its_mode(tmp_path):
+def test_a_replaced_file_keeps_its_path_and_its_mode(tmp_path):
     """Whoever linked to it or shared it with a group goes on reading it."""
     path, link = tmp_path / "a.json", tmp_path / "link.json"
     path.write_text("old")
@@ -190,7 +190,7 @@ def test_python_control_computes_with_it(model):
     assert np.sort_complex(system.poles()) == pytest.approx(np.sort_complex(model.poles), rel=1e-6)
 
 
-def test_without_python_control_it_is_told_how_to_get_it(model, monkeypatch):
+def test_without_python_control_the_message_says_how_to_get_it(model, monkeypatch):
     monkeypatch.setitem(sys.modules, "control", None)
     with pytest.raises(ExportError, match="python-control is not installed; remedy: pip install control"):
         model.to_control()

@@ -62,7 +62,7 @@ def test_a_double_integrator_has_its_textbook_gains():
     np.testing.assert_allclose(cost, [[math.sqrt(3.0), 1.0], [1.0, math.sqrt(3.0)]], rtol=1e-12)
 
 
-def test_what_no_control_reaches_is_told():
+def test_what_no_control_reaches_is_reported():
     with pytest.raises(PilotError, match="cannot stabilise"):
         lqr(np.diag([1.0, -1.0]), np.array([[0.0], [1.0]]), np.ones(2), np.ones(1))
 
@@ -266,7 +266,7 @@ def test_every_heading_is_like_north(sbs, model, found):
     np.testing.assert_allclose(turned["north"] * c + turned["east"] * s, north["north"], atol=1e-9)
 
 
-def test_turbulence_and_a_gust_leave_it_at_its_place(sbs, model, found):
+def test_turbulence_and_a_gust_leave_it_at_its_position(sbs, model, found):
     air = Wind(
         velocity=(-4.0, 0.0, 0.0),
         turbulence_intensity=(1.5, 1.5, 1.5),
@@ -324,7 +324,7 @@ def test_what_is_not_finite_is_refused_and_changes_nothing(found):
 def test_the_first_controls_of_a_pilot_are_treated_like_all_others(sbs, model):
     """Beyond the range of the collective they are clipped, beyond reason refused by their name."""
     highest = sbs.control_ranges["collective"][1]
-    # of a state alone the swashplates are where they are told
+    # of a state alone the positions of the swashplates are given
     for start in (model.trim, trimmed_state(sbs, model.trim)):
         flights = [
             simulate_with_pilot(sbs, start, lambda t, x, c=c: [c, 0.0, 0.0, 0.0], 0.05)

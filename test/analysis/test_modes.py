@@ -401,7 +401,7 @@ def test_loci_follow_the_rotors():
     assert tail[0] < main[0] < tail[-1]
 
 
-def test_growing_rotor_modes_are_told(sbs):
+def test_growing_rotor_modes_are_reported(sbs):
     """Lag without a damper grows somewhere at speed, with one nowhere; what grows of the body is not a rotor's."""
     loose, damped = (linearize(sbs.with_value("rotors.lag_damping", value), airspeed=15.0) for value in (0.0, 0.5))
     assert any(mode.pole.real > 0.0 for mode in damped.modes)
@@ -447,8 +447,8 @@ def test_heavily_damped_flap_keeps_its_name():
     assert sum("flap" in name for name in found) == 2
 
 
-def test_a_regressing_flap_that_does_not_oscillate_is_told_from_the_advancing_one():
-    """Rotating at one per revolution it stands still in fixed axes: two real poles, told apart by unequal springs."""
+def test_a_regressing_flap_that_does_not_oscillate_is_distinguished_from_the_advancing_one():
+    """Rotating at one per revolution it stands still in fixed axes: two real poles that differ by unequal springs."""
     omega, damping, unequal = 1.0, 0.5, 0.1
     stiffness = 1.0 + damping**2 / 4.0  # so that the damped frequency is one per revolution
     a = np.zeros((4, 4))

@@ -1,4 +1,4 @@
-"""Monte Carlo: what is scattered, what is told of it, and the command `batch`."""
+"""Monte Carlo: what is scattered, what is reported of it, and the command `batch`."""
 
 import csv
 import io
@@ -53,7 +53,7 @@ def test_values_are_scattered_normally_around_those_of_the_file(sbs):
     assert len({case.wind.turbulence_seed for case in cases}) == count
 
 
-def test_the_command_tells_in_how_many_flights_the_model_does_not_hold(tmp_path):
+def test_the_command_says_in_how_many_flights_the_model_does_not_hold(tmp_path):
     files = ("--csv", tmp_path / "f.csv", "--json", tmp_path / "f.json")
     text = output("batch", "--flights", 2, "--duration", 0.2, "--climb-rate", -7, "--turbulence", 0, *files)
     line = "MR1: vortex ring state, where momentum theory does not hold"
@@ -62,7 +62,7 @@ def test_the_command_tells_in_how_many_flights_the_model_does_not_hold(tmp_path)
     assert all(flight["warnings"][0] == line for flight in json.loads((tmp_path / "f.json").read_text())["flights"])
 
 
-def test_the_field_passes_with_the_airspeed_and_never_stands(sbs):
+def test_the_field_passes_with_the_airspeed_and_never_stops(sbs):
     fast, hovering = (gust_cases(sbs, 1, {"airspeed": speed}, turbulence=1.0)[0].wind for speed in (-12.0, 0.0))
     assert (fast.turbulence_airspeed, hovering.turbulence_airspeed) == (12.0, 5.0)
     (case,) = gust_cases(sbs, 1, TrimCondition(airspeed=-12.0, sideslip=0.5), turbulence=1.0)
@@ -152,7 +152,7 @@ def test_the_command_prints_percentiles_and_writes_files(tmp_path):
     assert (tmp_path / "batch.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_flights_of_which_none_begins_are_told_with_their_reasons(tmp_path):
+def test_flights_of_which_none_begins_are_reported_with_their_reasons(tmp_path):
     table, file = tmp_path / "a.csv", tmp_path / "a.json"
     ended = call("batch", "--flights", 2, "--duration", 0.1, "--airspeed", 99, "--csv", table, "--json", file)
     assert ended.returncode == 1
@@ -162,6 +162,6 @@ def test_flights_of_which_none_begins_are_told_with_their_reasons(tmp_path):
     assert all("no trim" in flight["error"] for flight in json.loads(file.read_text())["flights"])
 
 
-def test_the_command_tells_what_is_wrong_in_one_line():
+def test_the_command_says_what_is_wrong_in_one_line():
     assert failure("batch", "--flights", 0) == "flights = 0: allowed are integers from 1 to 1000000"
     assert failure("batch", "--workers", 2, "--dask", "x").startswith("workers = 2: not allowed with dask")

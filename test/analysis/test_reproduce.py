@@ -434,7 +434,7 @@ def test_other_aircraft_are_said_to_be_others(report):
     assert heavier.paper_reading == usual.paper_reading
 
 
-def test_progress_is_told():
+def test_progress_is_reported():
     seen = []
     reproduce(progress=lambda done, total: seen.append((done, total)))
     assert [done for done, _ in seen] == list(range(1, len(seen) + 1))
@@ -583,8 +583,8 @@ def test_run_reproduce(executed, data):
     row = next(line for line in lines if line.startswith("Short period"))
     assert row.split()[2:] == ["-7.26", "-4.008", "0.552*", "-7.297", "1.005", "[1]"]
     assert json.loads((folder / "all.json").read_text()) == data
-    told = f"written: {folder / 'made' / 'by it' / PAGE} and {2 * len(FIGURES)} figures"
-    assert lines[-1] == told
+    reported = f"written: {folder / 'made' / 'by it' / PAGE} and {2 * len(FIGURES)} figures"
+    assert lines[-1] == reported
 
 
 def test_without_a_folder_nothing_is_drawn(tmp_path):

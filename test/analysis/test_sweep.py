@@ -130,7 +130,7 @@ def test_forwards_and_backwards_are_alike_but_for_the_drag(speeds):
 # -- failures --------------------------------------------------------------------------------------------------------
 
 
-def test_failed_points_stay_in_their_places(masses):
+def test_failed_points_keep_their_order(masses):
     assert [point.error is None for point in masses.points] == [False, True, True, True, False]
     assert masses.failed == (masses.points[0], masses.points[4])
     assert masses.points[0].error == "body.mass = 0.5: allowed is > 0.9678, the mass of all blades"
@@ -350,7 +350,7 @@ def test_of_a_sweep_without_models_there_are_trim_curves_only(sbs, tmp_path):
     assert save_plots(sweep(sbs, "body.mass", [0.5]), tmp_path) == []
 
 
-def test_plots_that_cannot_be_written_are_told_in_one_line(speeds, tmp_path):
+def test_plots_that_cannot_be_written_are_reported_in_one_line(speeds, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ExportError, match="file: no folder can be made there: File exists"):
         save_plots(speeds, tmp_path / "file")

@@ -1,4 +1,4 @@
-"""Where trims are looked for: momentum theory, guesses of the user, paths; and what is told where all fail."""
+"""Where trims are looked for: momentum theory, guesses of the user, paths; and what is reported where all fail."""
 
 import math
 from dataclasses import astuple
@@ -164,7 +164,7 @@ def test_slopes_of_a_rotor_are_its_differences(uh60a):
         np.testing.assert_allclose(slopes[rows, k], found[rows], rtol=1e-4, atol=1e-3)
 
 
-def test_stall_is_told_from_attached_flow(sbs):
+def test_stall_is_distinguished_from_attached_flow(sbs):
     """At 20 m/s down the same thrust comes from 3.4 deg of collective, and from 80 deg with all sections stalled."""
     problem = TrimProblem(sbs, Fidelity())
     theory, condition = MomentumTheory(problem), TrimCondition(climb_rate=-20.0)
@@ -315,7 +315,7 @@ def test_an_aircraft_too_heavy_to_hover_flies_at_speed():
 
 
 def test_a_tail_rotor_too_small_for_hover_is_enough_at_speed(uh60a):
-    """With blades of 7 cm it stalls below the torque of hover: told by name."""
+    """With blades of 7 cm it stalls below the torque of hover: reported by name."""
     small = uh60a.with_value("rotors.tail.chord", {"root": 0.07, "tip": 0.07})
     with pytest.raises(TrimError, match=r"cannot carry more than 8\d\.?\d* % of the weight, where tail stalls"):
         trim(small)
@@ -377,12 +377,12 @@ def test_what_was_trimmed_before_changes_no_bit():
 
 
 def test_a_hover_that_failed_fails_again_with_the_same_words():
-    aircraft, told = build(body={"mass": 90.0}), []
+    aircraft, reported = build(body={"mass": 90.0}), []
     for _ in range(2):
         with pytest.raises(TrimError, match="cannot carry more than") as caught:
             trim(aircraft)
-        told.append((str(caught.value), caught.value.residual))
-    assert told[0] == told[1]
+        reported.append((str(caught.value), caught.value.residual))
+    assert reported[0] == reported[1]
 
 
 def test_of_two_flights_the_one_within_the_limits_is_found(sbs_paper):
@@ -411,7 +411,7 @@ def test_a_random_fleet_flies(kind):
             assert point.beyond_limits == (), (i, name)
 
 
-# -- what is told --------------------------------------------------------------------------------------------
+# -- what is reported ---------------------------------------------------------------------------------------
 
 
 def share_of(error):
@@ -420,7 +420,7 @@ def share_of(error):
 
 
 @pytest.mark.parametrize("heavy", [80.0, 400.0, 1500.0])
-def test_the_weight_that_is_told_is_what_the_rotors_carry(heavy):
+def test_the_weight_in_the_message_is_what_the_rotors_carry(heavy):
     """An aircraft of that mass hovers, one of 2 % more does not."""
     with pytest.raises(TrimError) as error:
         trim(build(body={"mass": heavy}))
@@ -470,7 +470,7 @@ def test_without_air_there_is_nothing_to_trim_with():
 
 
 @pytest.mark.parametrize("condition", [{"airspeed": 70.0}, {"climb_rate": 45.0}])
-def test_beyond_the_reach_of_the_rotors_all_that_stops_them_is_told(sbs, condition):
+def test_beyond_the_reach_of_the_rotors_all_that_stops_them_is_reported(sbs, condition):
     """How far the path from hover leads, what it takes there, and what is left."""
     with pytest.raises(TrimError) as error:
         trim(sbs, **condition)
@@ -480,7 +480,7 @@ def test_beyond_the_reach_of_the_rotors_all_that_stops_them_is_told(sbs, conditi
     assert text.endswith(f" is not balanced, residual {error.value.residual:.3g} in {error.value.worst_equation}")
 
 
-def test_what_no_weight_makes_possible_is_told_by_momentum_theory(uh60a):
+def test_what_no_weight_makes_possible_is_reported_by_momentum_theory(uh60a):
     """The drag of the main rotor's blades alone is too much for a tail rotor with blades of 2 cm.
 
     It would need the thrust of the right one with a twelfth of its blade area: a lift coefficient above 3.

@@ -45,7 +45,7 @@ def mean_balance(model, point, count=12):
 
 # -- the balance against the plain reference -----------------------------------------------------------------
 
-ODD = {
+UNUSUAL = {
     "hinge_offset": 0.09,
     "flap_hinge_offset": 0.035,
     "lag_spring": 25.0,
@@ -57,9 +57,9 @@ AIRCRAFT = {
     "sbs": {},
     "sbs_paper": {"name": "sbs_paper"},
     "paper coupling only": {"options": {"coupling": "paper"}},
-    "tilted": {"every_rotor": ODD, "rotors": TILTED},
-    "tilted, paper": {"name": "sbs_paper", "every_rotor": ODD, "rotors": TILTED},
-    "four and five blades": {"rotors": [{"blades": 4}, {"blades": 5}], "every_rotor": ODD},
+    "tilted": {"every_rotor": UNUSUAL, "rotors": TILTED},
+    "tilted, paper": {"name": "sbs_paper", "every_rotor": UNUSUAL, "rotors": TILTED},
+    "four and five blades": {"rotors": [{"blades": 4}, {"blades": 5}], "every_rotor": UNUSUAL},
     "six and seven blades": {"rotors": [{"blades": 6}, {"blades": 7}], "every_rotor": {"blade_mass": 0.05}},
 }
 
@@ -316,7 +316,7 @@ def test_outer_loop_drives_away_from_a_hover_that_is_not_symmetric(sbs, hover):
         ("MAX_RESIDUAL", 1e-4, {"airspeed": 10.0, "cyclic_inflow": False}, "the loops come to rest off trim"),
     ],
 )
-def test_every_end_is_told(sbs, monkeypatch, limit, value, condition, reason):
+def test_every_end_is_reported(sbs, monkeypatch, limit, value, condition, reason):
     monkeypatch.setattr(two_loop, limit, value)
     with pytest.raises(TrimError) as error:
         trim(sbs, method="two_loop", **condition)
@@ -364,7 +364,7 @@ def test_unknown_method_is_refused(sbs, method):
 
 
 @pytest.mark.parametrize("count", [0, 1001, -3, 2.5, 12.0, math.nan, math.inf, True, "12", None])
-def test_number_of_azimuths_is_a_whole_number(sbs, count):
+def test_number_of_azimuths_is_an_integer(sbs, count):
     with pytest.raises(TrimError) as error:
         trim(sbs, azimuth_count=count)
     assert str(error.value) == f"azimuth_count = {count!r}: allowed are integers from 1 to 1000"

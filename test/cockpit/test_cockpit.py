@@ -260,7 +260,7 @@ def test_charts_have_a_name_for_every_value():
     np.testing.assert_allclose(controls.values(snapshot), np.degrees(point.controls), atol=1e-9)
 
 
-def test_the_pole_page_names_the_modes_and_tells_their_numbers():
+def test_the_pole_page_names_the_modes_and_shows_their_numbers():
     # a phugoid that doubles in ln 2 / 0.1 = 6.93 s and a roll subsidence that halves in 0.231 s
     page = pole_page([Pole("phugoid", complex(0.1, 0.5)), Pole("roll & co", complex(-3.0, 0.0))], "hover")
     for part in ("phugoid", "roll &amp; co", "-0.20", "6.93", "0.231", "[rad/s]", "hover"):
@@ -306,9 +306,9 @@ def test_a_trim_says_where_the_flight_is_not_in_it():
     state[S.RATES] = math.radians(10.0)
     tilted = dataclasses.replace(snapshot, state=state)
     trimmed = TrimResult(TrimCondition(), point.controls, point.pitch, point.roll, 0.0, 0.0, ("stalled",))
-    told = "The flight is not in this trim: pitch 50.0 deg instead of 0.0, p 10.0 deg/s instead of 0.0."
+    reported = "The flight is not in this trim: pitch 50.0 deg instead of 0.0, p 10.0 deg/s instead of 0.0."
     for page in (trim_page(trimmed, tilted, AIRCRAFT), model_page(trimmed, tilted)):
-        assert told in page
+        assert reported in page
         assert "stalled" in page
 
 
@@ -429,7 +429,7 @@ def test_a_recording_knows_the_controls_of_every_time():
         np.testing.assert_allclose(np.degrees(step), 0.5 * np.eye(4)[i], atol=1e-6)
 
 
-def test_what_is_no_log_is_told_in_one_line(tmp_path):
+def test_what_is_no_log_is_reported_in_one_line(tmp_path):
     (tmp_path / "a.mcap").write_bytes(b"nothing")
     assert [path.name for path in list_logs(tmp_path)] == ["a.mcap"]
     assert list_logs(tmp_path / "nowhere") == []
@@ -464,7 +464,7 @@ def end_of_cockpit(*arguments, domain=0):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "reported"),
     [
         (["--port", "0"], "--port 0: allowed are 1 to 65535"),
         (["--port", "70000"], "--port 70000: allowed are 1 to 65535"),
@@ -478,13 +478,13 @@ def end_of_cockpit(*arguments, domain=0):
         ),
     ],
 )
-def test_a_wrong_command_line_is_told(arguments, told):
+def test_a_wrong_command_line_is_reported(arguments, reported):
     code, lines = end_of_cockpit(*arguments)
     assert code == 2
-    assert told in lines[-1]
+    assert reported in lines[-1]
 
 
-def test_a_port_that_is_taken_is_told_in_one_line():
+def test_a_port_that_is_taken_is_reported_in_one_line():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         code, lines = end_of_cockpit("--port", str(port), domain=next(DOMAINS))
@@ -494,14 +494,14 @@ def test_a_port_that_is_taken_is_told_in_one_line():
     assert "--port" in lines[0]
 
 
-def test_a_host_that_is_not_this_machine_is_told_in_one_line():
+def test_a_host_that_is_not_this_machine_is_reported_in_one_line():
     code, lines = end_of_cockpit("--host", "192.0.2.1", domain=next(DOMAINS))  # RFC 5737: nobody has it
     assert code == 1
     assert len(lines) == 1
     assert "192.0.2.1" in lines[0]
 
 
-def test_a_folder_that_is_not_there_is_told_in_one_line(tmp_path):
+def test_a_folder_that_is_not_there_is_reported_in_one_line(tmp_path):
     code, lines = end_of_cockpit("--logs", str(tmp_path / "none"), "--port", str(free_port()), domain=next(DOMAINS))
     assert (code, lines) == (1, [f"--logs {tmp_path / 'none'}: allowed is a folder with logs"])
 
@@ -644,7 +644,7 @@ def test_a_narrow_picture_is_taken_from_further_away(width, factor):
 
 
 @pytest.mark.parametrize(
-    ("ground", "shown", "told"),
+    ("ground", "shown", "reported"),
     [
         (None, (True, False), ["height of the origin: lines 1 m and 10 m apart"]),
         (0.0, (False, True), ["ground, at the origin's height: lines 1 m and 10 m apart"]),
@@ -658,7 +658,7 @@ def test_a_narrow_picture_is_taken_from_further_away(width, factor):
         ),
     ],
 )
-def test_the_ground_is_drawn_where_it_is(server, ground, shown, told):
+def test_the_ground_is_drawn_where_it_is(server, ground, shown, reported):
     scene = Scene(server, AIRCRAFT, Shown())
     scene.set_ground(ground)
     level, plane = (server.scene.get_handle_by_name(f"/ned/earth/{name}") for name in ("level", "ground"))
@@ -667,7 +667,7 @@ def test_the_ground_is_drawn_where_it_is(server, ground, shown, told):
     assert level.plane_opacity == 0.0  # one sees, and flies, through it
     if ground is not None:
         assert plane.position[2] == -ground
-    assert scene.lines == told
+    assert scene.lines == reported
 
 
 @pytest.mark.parametrize(("name", "ducts"), [("sbs", 2), ("tail_rotor", 0), ("tandem", 0)])
@@ -793,7 +793,7 @@ def test_a_second_simulator_is_refused_and_a_second_cockpit_can_join(flying):
 
 
 class Commanded:
-    """A pilot of a page that keeps what it is told to fly."""
+    """A pilot of a page that keeps its commands."""
 
     def __init__(self):
         self.controls = None

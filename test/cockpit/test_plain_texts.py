@@ -77,7 +77,7 @@ def test_the_cockpit_has_no_panel_of_markdown():
         assert "add_markdown" not in path.read_text(), path
 
 
-def test_what_goes_onto_the_page_as_html_is_made_in_places_that_escape():
+def test_html_on_the_page_is_made_by_functions_that_escape():
     """A name that comes from a file has no way around: f-strings of HTML are in these modules alone."""
     allowed = {"charts", "page_head", "poles", "readouts", "trim_report", "view"}
     for path in (PACKAGE / "cockpit").glob("*.py"):

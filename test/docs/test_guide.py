@@ -249,7 +249,7 @@ def test_what_the_site_adds_to_the_pages(tmp_path):
     assert index.count(":caption: ") == 2
 
 
-def test_a_missing_generator_is_told_in_one_line(tmp_path):
+def test_a_missing_generator_is_reported_in_one_line(tmp_path):
     (tmp_path / "tools").mkdir()
     script = tmp_path / "tools" / "make_docs.py"
     script.write_text((ROOT / "tools" / "make_docs.py").read_text())

@@ -38,11 +38,11 @@ def test_no_interface_and_no_field_is_missing():
 def test_topics_and_services_are_those_of_the_guide():
     guide = (ROOT / "docs" / "ros_interface.md").read_text()
     for heading, page in (("## Topics", "topics"), ("## Services", "services")):
-        told = re.findall(r"^\| `([/\w]+)` \| `(\w+/\w+)`", guide.split(heading)[1].split("\n##")[0], re.MULTILINE)
+        reported = re.findall(r"^\| `([/\w]+)` \| `(\w+/\w+)`", guide.split(heading)[1].split("\n##")[0], re.MULTILINE)
         listed = re.findall(r"^\| `([/\w]+)` \|[ \w]*\|? \[?`(\w+/\w+)`", written(page), re.MULTILINE)
-        assert len(told) >= 6
-        assert {name for name, _ in listed} - {"sweep"} == {name for name, _ in told}
-        assert set(told) - set(listed) == set()
+        assert len(reported) >= 6
+        assert {name for name, _ in listed} - {"sweep"} == {name for name, _ in reported}
+        assert set(reported) - set(listed) == set()
 
 
 def test_every_executable_has_its_section():
@@ -51,7 +51,7 @@ def test_every_executable_has_its_section():
     assert all((EXECUTABLES / name).exists() for name in headings)
 
 
-def test_every_option_is_told():
+def test_every_option_is_documented():
     for name, module in reference.executables().items():
         parser = reference.parser_of(module)
         if parser is not None:

@@ -58,7 +58,7 @@ def test_named_code_exists(file, names):
     assert set(names) - definitions(ROOT / file) == set()
 
 
-def test_every_section_has_its_place_in_the_code():
+def test_every_section_names_its_code():
     assert len(code_references()) > 30
     parts = re.split(r"^## (?=\d)", WRITTEN.split("## Open choices")[0], flags=re.MULTILINE)[1:]
     assert [part.split()[0] for part in parts] == [str(number) for number in range(1, 10)]
@@ -221,7 +221,7 @@ def test_equations_are_numbered_one_after_the_other():
     assert min(last.values()) > 0
 
 
-def test_equations_stand_in_their_sections():
+def test_equations_are_in_their_sections():
     for part in re.split(r"^## (?=\d)", WRITTEN, flags=re.MULTILINE)[1:]:
         number = part.split()[0]
         assert set(re.findall(r"\\tag\{(\d+)\.", part.split("\n## ")[0])) == {number}
@@ -265,7 +265,7 @@ def test_brackets_of_equations_are_closed():
             assert math.count(left) == math.count(right), math
 
 
-def test_inline_equations_stand_free():
+def test_inline_equations_have_spaces_around_them():
     """A letter, digit or hyphen at a dollar keeps GitHub from finding the equation."""
     without_code = re.sub(r"`[^`\n]*`", "code", PROSE)
     assert without_code.count("$") == 2 * len(INLINE)
@@ -281,7 +281,7 @@ def test_inline_equations_stand_free():
 # -- the generated tables --------------------------------------------------------------------------------------------
 
 
-def test_tables_of_the_reproduction_are_in_their_place():
+def test_tables_of_the_reproduction_are_in_their_section():
     assert [TEXT.count(mark) for mark in MARKS] == [1, 1]
     before, inside = TEXT.split(MARKS[1])[0].split(MARKS[0])
     assert before.rstrip().split("\n### ")[-1].startswith("9.10 ")

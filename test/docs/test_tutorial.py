@@ -36,8 +36,8 @@ def test_the_python_blocks_run_one_after_the_other(folder):
     assert result.returncode == 0, result.stderr
     assert "38 states: u w q theta v p phi r\n" in result.stdout
     printed = dict(re.findall(r"^(.*): .* doubles in (.*) s$", result.stdout, re.MULTILINE))
-    told = re.search(r"a phugoid and a Dutch roll that grow, doubling in (\S+) and (\S+) s", TEXT)
-    assert printed == {"phugoid": told[1], "Dutch roll": told[2]}
+    reported = re.search(r"a phugoid and a Dutch roll that grow, doubling in (\S+) and (\S+) s", TEXT)
+    assert printed == {"phugoid": reported[1], "Dutch roll": reported[2]}
     north, height = re.search(r"after 8 s at north (\S+) m, height (\S+) m", result.stdout).groups()
     assert float(north) == pytest.approx(2.0, abs=0.1)
     assert float(height) == pytest.approx(1.0, abs=0.05)

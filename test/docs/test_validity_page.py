@@ -93,8 +93,8 @@ def test_every_warning_is_explained():
     texts = []
     for node in ast.walk(ast.parse(Path(validity.__file__).read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "append":
-            (told,) = node.args
-            texts.append([part.value for part in told.values if isinstance(part, ast.Constant)])
+            (reported,) = node.args
+            texts.append([part.value for part in reported.values if isinstance(part, ast.Constant)])
     assert len(texts) == len(re.findall(r"^\| \"", PAGE, re.MULTILINE)) - 1 == 6  # the states of the inflow are two
     table = PAGE[PAGE.index("## The warnings") : PAGE.index("## How it was checked")]
     quoted = re.findall(r"^\| \"([^\"]+)\"", table, re.MULTILINE)

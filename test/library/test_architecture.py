@@ -215,7 +215,7 @@ def test_the_model_knows_nothing_of_the_time_of_day(name):
 
 
 @pytest.mark.parametrize("name", [name for name in MODULES if name not in COMMANDS and name != "sbs_sim.__main__"])
-def test_nothing_stands_on_the_commands(name):
+def test_nothing_imports_the_commands(name):
     assert [item for item in own_imports(name) if within(item, ["sbs_sim.commands"])] == []
 
 

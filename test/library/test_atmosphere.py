@@ -72,7 +72,7 @@ def test_an_altitude_in_the_file_is_the_air_of_the_model():
     assert Aircraft.from_dict(with_environment(**given)).parameter_hash == aircraft.parameter_hash
 
 
-def test_an_altitude_takes_the_place_of_the_air(sbs):
+def test_an_altitude_replaces_the_values_of_the_air(sbs):
     high = sbs.with_value("environment.altitude", 3000.0)
     assert high.environment.air_density == standard_air(3000.0).density
     assert high.environment.gravity == sbs.environment.gravity

@@ -42,7 +42,7 @@ def call(*words):
 
 
 @pytest.mark.parametrize("name", NODES)
-def test_help_of_a_node_tells_what_it_does_its_topics_services_and_parameters(name):
+def test_help_of_a_node_says_what_it_does_and_lists_topics_services_and_parameters(name):
     """Everything that the reference has of it, which is read from the same sources."""
     text = usage.text(name)
     docstring = ast.get_docstring(ast.parse((ROOT / "sbs_sim" / "nodes" / f"{name}.py").read_text()))
@@ -109,7 +109,7 @@ def test_every_executable_knows_its_version(name):
         (("sweep", "body.mas", "0", "1", "2"), 1, "did you mean body.mass?; body.mas: unknown key, "),
     ],
 )
-def test_what_is_mistyped_is_told_with_what_may_have_been_meant(words, code, line):
+def test_a_mistyped_name_is_reported_with_similar_names(words, code, line):
     result = call(INSTALLED / words[0], *words[1:])
     assert (result.returncode, result.stdout) == (code, "")
     assert line in result.stderr.splitlines()[-1]
@@ -146,7 +146,7 @@ def test_nothing_is_suggested_where_nothing_is_near():
 # -- words -----------------------------------------------------------------------------------------------------------
 
 
-def test_older_spellings_work_and_are_not_told(tmp_path):
+def test_older_spellings_work_and_are_not_documented(tmp_path):
     """test_recorder.py flies with them."""
     linear, replayed = (reference.parser_of(reference.executables()[name]) for name in ("linearize", "replay"))
     assert linear.parse_args(["--export", "a.npz"]) == linear.parse_args(["--out", "a.npz"])

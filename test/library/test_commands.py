@@ -47,7 +47,7 @@ def failure(name, *arguments, **options):
 
 
 def row(text, label):
-    """Numbers behind a label, which stands at the beginning of a line."""
+    """Numbers behind a label, which is at the beginning of a line."""
     line = next(line for line in text.splitlines() if line.startswith(label))
     return [float(number) for number in re.findall(r"[-+]?\d+\.?\d*(?:e[-+]\d+)?", line.removeprefix(label))]
 
@@ -124,7 +124,7 @@ def test_commands_say_where_the_model_does_not_hold(tmp_path):
     assert [bool(line["warnings"]) for line in csv.DictReader((tmp_path / "a.csv").open())] == [True, False]
 
 
-def test_trim_tells_which_way_the_controls_go():
+def test_trim_says_which_way_the_controls_go():
     """Of this aircraft, whose fourth control turns the nose to the right."""
     file = Path(__file__).resolve().parents[1] / "data" / "tandem.yaml"
     for aircraft, yaw in ((file, "nose right"), (file.with_name("tail_rotor.yaml"), "nose left")):
@@ -166,7 +166,7 @@ def test_linearize_prints_modes(sbs, tmp_path):
     assert json.loads((tmp_path / "model.json").read_text()) == model.to_dict()
 
 
-def test_linearize_tells_rotor_modes_that_grow():
+def test_linearize_reports_rotor_modes_that_grow():
     """Lag without a damper, in the settled model too, which has no rotor states; nothing of the body."""
     loose = ("linearize", "--airspeed", 20, "--set", "rotors.lag_damping=0")
     for more in ((), ("--quasi-static",)):
@@ -233,7 +233,7 @@ def test_sweep_prints_a_table_and_writes_files(sbs, tmp_path):
     assert all(f"written: {tmp_path / 'plots' / name}\n" in text for name in names)
 
 
-def test_sweep_takes_degrees_and_tells_failures(sbs):
+def test_sweep_takes_degrees_and_reports_failures(sbs):
     text = output("sweep", "sideslip_deg", "--airspeed", 4, "--trims-only", "--values", -90, 200)
     point = trim(sbs, airspeed=4.0, sideslip=-math.pi / 2)
     assert text.startswith("sideslip [deg]  pitch [deg]")
@@ -298,7 +298,7 @@ def test_an_error_is_one_line(arguments, line):
     assert failure(*arguments).startswith(line)
 
 
-def test_a_file_that_cannot_be_written_is_told_before_the_work():
+def test_a_file_that_cannot_be_written_is_reported_before_the_work():
     for arguments in (("trim", "--json"), ("linearize", "--export"), ("sweep", "airspeed", "0", "1", "1", "--csv")):
         result = call(*arguments, "/nowhere/file.json")
         assert result.returncode == 1
@@ -327,7 +327,7 @@ MISUSES = {
 
 
 @pytest.mark.parametrize("arguments", MISUSES.values(), ids=MISUSES)
-def test_a_wrong_command_line_is_told_with_the_usage(arguments):
+def test_a_wrong_command_line_is_reported_with_the_usage(arguments):
     result = call(*arguments)
     assert (result.returncode, result.stdout) == (2, "")
     assert result.stderr.startswith(f"usage: {arguments[0]} ")
@@ -394,7 +394,7 @@ def test_a_reader_that_goes_away_is_no_error():
     assert result.stderr == ""
 
 
-def test_an_output_that_is_full_is_told():
+def test_an_output_that_is_full_is_reported():
     with Path("/dev/full").open("w") as full:
         result = subprocess.run(
             command("trim"), stdout=full, stderr=subprocess.PIPE, text=True, timeout=PATIENCE, check=False

@@ -36,7 +36,7 @@ CODE = """
         "sweep": lambda: sweep(Aircraft.load("sbs"), "airspeed", np.linspace(0.0, 20.0, 100_000), workers=2),
     }
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a script starts in the background
-    print("begun", flush=True)
+    print("started", flush=True)
     try:
         calls[CALL]()
     except KeyboardInterrupt:
@@ -48,7 +48,7 @@ CODE = """
 def test_ctrl_c_ends_what_would_take_hours(call):
     code = textwrap.dedent(CODE).replace("CALL", repr(call))
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "begun\n"
+        assert process.stdout.readline() == "started\n"
         watched, end = psutil.Process(process.pid), time.monotonic() + PATIENCE
         before = watched.cpu_times().user
         while watched.cpu_times().user < before + 0.3:  # it is at work
@@ -91,10 +91,10 @@ def test_ctrl_c_is_not_lost_while_machine_code_is_loaded():
 
 
 def test_calls_at_work_end_where_they_look_and_those_that_wait_do_not_begin(sbs):
-    begun, ended = [], []
+    started, ended = [], []
 
     def work(_, number):
-        begun.append(number)
+        started.append(number)
         try:
             while True:
                 interruption.look()
@@ -104,13 +104,13 @@ def test_calls_at_work_end_where_they_look_and_those_that_wait_do_not_begin(sbs)
             raise
 
     def asked():
-        if len(begun) == 2:
+        if len(started) == 2:
             raise KeyboardInterrupt
         return False
 
     with pytest.raises(KeyboardInterrupt):
         compute(work, [(sbs, i) for i in range(5)], lambda *_: None, workers=2, cancelled=asked)
-    assert sorted(begun) == sorted(ended) == [0, 1]
+    assert sorted(started) == sorted(ended) == [0, 1]
 
 
 def test_an_error_of_the_caller_ends_the_flights_too(sbs, hover):

@@ -1,4 +1,4 @@
-"""Integers where a message wants floats: rclpy sends their bytes, and what comes is told by its name."""
+"""Integers where a message wants floats: rclpy sends their bytes, and the field is named."""
 
 import math
 
@@ -22,7 +22,7 @@ from sbs_sim.nodes.pilot_conversions import to_target  # noqa: E402
 from sbs_sim.nodes.qos import COMMAND_QOS  # noqa: E402
 
 FAINT = 5e-324  # an integer of one digit, to CPython until 3.11; later ones have some units of that
-TOLD = r"an integer in a float field\?"
+HINT = r"an integer in a float field\?"
 
 
 @pytest.mark.parametrize("value", [5, True, 2**40, np.int64(5), np.int32(7)])
@@ -33,7 +33,7 @@ def test_what_rclpy_sends_for_an_integer_is_refused_by_name(value):
     message.x = value
     arrived = deserialize_message(serialize_message(message), Vector3)
     request = SetWind.Request(velocity=arrived)
-    with pytest.raises(SbsError, match=rf"^velocity\.x = .*{TOLD}"):
+    with pytest.raises(SbsError, match=rf"^velocity\.x = .*{HINT}"):
         check_numbers(request)
 
 
@@ -55,7 +55,7 @@ def every_scalar():
 @pytest.mark.parametrize(("kind", "name"), every_scalar())
 def test_every_field_is_looked_at(kind, name):
     check_numbers(kind())
-    with pytest.raises(SbsError, match=rf"^{name} = 5e-324: allowed are 0 and .*{TOLD}"):
+    with pytest.raises(SbsError, match=rf"^{name} = 5e-324: allowed are 0 and .*{HINT}"):
         check_numbers(spoilt(kind(), name))
 
 
@@ -73,7 +73,7 @@ def test_a_target_is_looked_at():
     target = PoseStamped()
     target.header.frame_id, target.pose.orientation.w = "ned", 1.0
     to_target(target)
-    with pytest.raises(SbsError, match=rf"^position\.y = 5e-324: .*{TOLD}"):
+    with pytest.raises(SbsError, match=rf"^position\.y = 5e-324: .*{HINT}"):
         to_target(spoilt(target, "pose.position.y"))
 
 
@@ -98,20 +98,22 @@ def test_a_command_that_fades_away_is_no_integer(tmp_path):
             arrivals.accept(command, 0.0)
         assert value == 0.0
         arrivals.check(Controls(lateral_cyclic=3 * FAINT))
-        with pytest.raises(SbsError, match=rf"^longitudinal_cyclic = .*{TOLD}"):
+        with pytest.raises(SbsError, match=rf"^longitudinal_cyclic = .*{HINT}"):
             arrivals.check(Controls(longitudinal_cyclic=FAINT))
         arrivals.restart()
-        with pytest.raises(SbsError, match=TOLD):
+        with pytest.raises(SbsError, match=HINT):
             arrivals.check(Controls(lateral_cyclic=FAINT))
 
 
 def test_a_service_answers_with_the_cause(tmp_path):
     with world(next(DOMAINS), tmp_path) as made:
         made.start("simulator", components="[simulator]", record="off")
-        told = made.client.call(SetWind, "set_wind", velocity=Vector3(y=FAINT))
-        assert not told.success
-        assert told.message.startswith("velocity.y = 5e-324: allowed are 0 and ")
-        assert "an integer in a float field?" in told.message
-        told = made.client.call(SetWind, "set_wind", velocity=Vector3(y=math.nan))  # a negative one
-        assert told.message.startswith("velocity.y = nan: allowed are -100 to 100 m/s; an integer in a float field?")
+        reported = made.client.call(SetWind, "set_wind", velocity=Vector3(y=FAINT))
+        assert not reported.success
+        assert reported.message.startswith("velocity.y = 5e-324: allowed are 0 and ")
+        assert "an integer in a float field?" in reported.message
+        reported = made.client.call(SetWind, "set_wind", velocity=Vector3(y=math.nan))  # a negative one
+        assert reported.message.startswith(
+            "velocity.y = nan: allowed are -100 to 100 m/s; an integer in a float field?"
+        )
         assert made.client.call(SetWind, "set_wind", velocity=Vector3(y=0.5)).success

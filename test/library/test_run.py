@@ -115,7 +115,7 @@ def test_without_arguments_it_says_how_to_call_it(clone):
         ("", ""),
     ],
 )
-def test_unknown_executable_is_told_without_building(clone, name, meant):
+def test_unknown_executable_is_reported_without_building(clone, name, meant):
     result = clone.call(name)
     assert result.returncode == 2
     if name:

@@ -109,7 +109,7 @@ def test_a_tree_that_cannot_be_written_flies_all_the_same(tmp_path):
     assert copied <= here  # copied, not compiled: nothing is there that is not here
 
 
-def test_a_tree_that_cannot_be_written_and_is_not_built_is_told(tmp_path):
+def test_a_tree_that_cannot_be_written_and_is_not_built_is_reported(tmp_path):
     copy = tmp_path / "sbs_sim"
     copy.mkdir()
     for name in ("run", "setup.py", "setup.cfg", "package.xml", "colcon_defaults.yaml"):

@@ -53,9 +53,9 @@ def test_a_profile_that_dds_does_not_take_ends_the_start():
         pytest.skip("this machine gives processes no network of their own")
     ended = run_alone(str(EXECUTABLES / "control_mixer"), **changes)
     assert ended.returncode == 1, ended.stderr
-    told = ended.stderr.splitlines()[-1]
-    assert re.match(r"DDS listens on 0\.0\.0\.0 port \d+", told)
-    assert "loopback.xml" in told
+    reported = ended.stderr.splitlines()[-1]
+    assert re.match(r"DDS listens on 0\.0\.0\.0 port \d+", reported)
+    assert "loopback.xml" in reported
     assert "Traceback" not in ended.stderr
 
 
@@ -86,17 +86,17 @@ print(confinement.alone_in_domain(domain), confinement.alone_in_domain(domain + 
 """
     own = {key: value for key, value in environment(domain).items() if "PROFILES_FILE" not in key}
 
-    def told(reach):
+    def reported(reach):
         changes = {**own, "ROS_AUTOMATIC_DISCOVERY_RANGE": reach}
         ended = subprocess.run([sys.executable, "-c", code], env=changes, capture_output=True, text=True, check=True)
         return ended.stdout.strip()
 
-    assert told("LOCALHOST") == "False True False"
-    assert told("SUBNET") == "False False False"
+    assert reported("LOCALHOST") == "False True False"
+    assert reported("SUBNET") == "False False False"
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         # DDSI-RTPS: port 7400 + 250 domain + 10 + 2 participant for what participants tell of themselves
         other.bind(("127.0.0.1", 7400 + 250 * domain + 10 + 2 * 17))
-        assert told("LOCALHOST") == "False False False"
+        assert reported("LOCALHOST") == "False False False"
 
 
 def test_the_user_has_the_last_word_on_the_network(tmp_path):

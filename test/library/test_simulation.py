@@ -330,7 +330,7 @@ def test_an_integration_that_explodes_stops_before(sbs):
 
 
 def test_the_sharpest_allowed_controls_leave_the_state_plausible_or_stop(sbs, hover):
-    """A minute of all controls at their ends: whatever becomes of it, the state stays one that may be told."""
+    """A minute of all controls at their ends: whatever happens, the state stays finite."""
     simulation = hovering(sbs, hover)
     simulation.set_swashplate(np.array([[20.0, 16.0, -16.0], [0.0, -16.0, 16.0]]) * DEG)
     try:
@@ -383,7 +383,7 @@ def test_blade_angles_are_those_of_the_multiblade_coordinates(sbs, hover):
         np.testing.assert_allclose(angles, a0 - a1 * np.cos(azimuth) - b1 * np.sin(azimuth), atol=1e-15)
 
 
-def test_trimmed_state_has_place_heading_and_wind(sbs, hover):
+def test_trimmed_state_has_position_heading_and_wind(sbs, hover):
     state = trimmed_state(sbs, hover, position=(1.0, 2.0, -3.0), heading=math.pi / 2, wind=(4.0, 5.0, 6.0))
     np.testing.assert_array_equal(state[POSITION:ATTITUDE], (1.0, 2.0, -3.0))
     np.testing.assert_allclose(state[ATTITUDE:VELOCITY], (math.sqrt(0.5), 0, 0, math.sqrt(0.5)), atol=1e-6)
@@ -439,26 +439,26 @@ def test_controls_beyond_their_ranges_are_refused_however_they_are_given(sbs, ho
             simulate(sbs, hover, controls, 0.05)
 
 
-def test_a_step_that_no_actuator_follows_is_flown_and_told(sbs, hover):
+def test_a_step_that_no_actuator_follows_is_flown_and_reported(sbs, hover):
     """120 deg/s are 1.2 deg in a tick of 0.01 s."""
     step = np.array([0.0, 0.0, 1.0, 0.0])
     within, beyond = (hover.controls + math.radians(size) * step for size in (1.19, 1.21))
     assert simulate(sbs, hover, within, 0.02).warnings == ()
-    told = tuple(
+    reported = tuple(
         f"{name}: longitudinal_cyclic is moved faster than its actuator moves, 120 deg/s" for name in ("MR1", "MR2")
     )
     flight = simulate(sbs, hover, beyond, 0.02)
-    assert flight.warnings == told
+    assert flight.warnings == reported
     assert flight["swashplate"][0].tolist() == sbs.mix(beyond).tolist()  # at once, as linear models have it
-    assert simulate(sbs, hover, np.array([hover.controls, beyond]), 0.02).warnings == told
-    state = trimmed_state(sbs, hover)  # of which nobody knows where the swashplates stood
+    assert simulate(sbs, hover, np.array([hover.controls, beyond]), 0.02).warnings == reported
+    state = trimmed_state(sbs, hover)  # whose swashplate angles are not known
     assert simulate(sbs, state, beyond, 0.02).warnings == ()
-    assert simulate(sbs, state, lambda t: hover.controls if t < 0.015 else beyond, 0.02).warnings == told
-    assert simulate_batch([Case(sbs, hover, beyond)], 0.02).warnings == (told,)
+    assert simulate(sbs, state, lambda t: hover.controls if t < 0.015 else beyond, 0.02).warnings == reported
+    assert simulate_batch([Case(sbs, hover, beyond)], 0.02).warnings == (reported,)
 
 
 def test_actuators_are_those_of_the_live_flight(sbs, hover):
-    """The mixer's: what is beyond is clipped and told, the swashplates take their time; bit for bit as with a pilot."""
+    """The mixer's: excess is clipped and reported, the swashplates take their time; bit for bit as with a pilot."""
     wanted = beyond(hover, "longitudinal_cyclic", 15.0)
     flight = simulate(sbs, hover, wanted, 0.3, actuators=True)
     assert flight.warnings == ("clipped: longitudinal_cyclic at its limit of 12 deg",)
@@ -492,7 +492,7 @@ def test_a_trim_of_an_aircraft_with_other_rotors_is_refused(sbs, hover):
     assert simulate_batch([Case(tandem, hover)], 0.1).errors == (line,)
 
 
-def test_attitude_and_airspeed_are_told_by_name(sbs):
+def test_attitude_and_airspeed_are_found_by_name(sbs):
     """In a turn in steady wind: angles as by their definition, and the speed relative to the air."""
     point = trim(sbs, airspeed=8.0, turn_rate=0.5)
     wind = Wind(velocity=(4.0, -3.0, 1.0))
@@ -510,7 +510,7 @@ def test_attitude_and_airspeed_are_told_by_name(sbs):
     assert repr(flight).startswith("<flight of 1 s, 101 rows of north, east, ")
 
 
-def test_a_flight_is_told_by_names(sbs, hover):
+def test_histories_of_a_flight_are_found_by_name(sbs, hover):
     flight = simulate(sbs, hover, hover.controls, 0.2)
     assert set(flight) == set(sbs.layout.names) | {
         "time",
@@ -579,7 +579,7 @@ def test_a_flight_may_start_from_a_state(sbs, hover):
 
 
 @pytest.mark.parametrize(("duration", "ticks"), [(0.0, 0), (0.01, 1), (0.014, 1), (0.016, 2), (0.1, 10), (0.29, 29)])
-def test_durations_are_whole_ticks(sbs, hover, duration, ticks):
+def test_durations_are_integer_numbers_of_ticks(sbs, hover, duration, ticks):
     assert len(simulate(sbs, hover, hover.controls, duration)["time"]) == ticks + 1
 
 

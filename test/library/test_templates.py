@@ -28,7 +28,7 @@ from sbs_sim.recording.definitions import parse
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 KINDS = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowArray, "odom": Odometry}
-ODD = (0.0, -0.0, 5e-324, -1.7976931348623157e308, 1.0 + 2**-52)  # every bit must come through
+UNUSUAL = (0.0, -0.0, 5e-324, -1.7976931348623157e308, 1.0 + 2**-52)  # every bit must come through
 
 
 def quadrotor():
@@ -50,7 +50,7 @@ def snapshot(aircraft, chance):
     """An instant with numbers that no flight has."""
     count, size = len(aircraft.rotors), aircraft.layout.size
     state = chance.uniform(-1e3, 1e3, size)
-    state[: len(ODD)] = ODD
+    state[: len(UNUSUAL)] = UNUSUAL
     return Snapshot(
         step=7,
         time=float(chance.uniform(0.0, 2e9)),
@@ -69,18 +69,18 @@ def is_told(kind, data):
     root = name.replace("/msg/", "/")
     text = message_definition(name, lambda package, place: Path(get_package_share_directory(package)) / place)
     layout = Layout(parse(root, text), root, data)
-    told = np.zeros(len(data), bool)
+    reported = np.zeros(len(data), bool)
     for form, offset in layout._formats.values():
-        told[offset : offset + np.dtype(form).itemsize] = True
-    return told
+        reported[offset : offset + np.dtype(form).itemsize] = True
+    return reported
 
 
 def assert_same_bytes(data, message):
     own, ros = np.frombuffer(data, np.uint8), np.frombuffer(serialize_message(message), np.uint8)
     assert len(own) == len(ros)
-    told = is_told(type(message), data)
-    assert told.mean() > 0.8
-    np.testing.assert_array_equal(own[told], ros[told])
+    reported = is_told(type(message), data)
+    assert reported.mean() > 0.8
+    np.testing.assert_array_equal(own[reported], ros[reported])
     assert deserialize_message(data, type(message)) == message
 
 
@@ -166,7 +166,7 @@ def four_more(message):
         (four_more, "is at 0 offsets of the serialised message, 1 is understood"),
     ],
 )
-def test_where_messages_are_laid_out_otherwise_ros_serialises_them_and_it_is_told(monkeypatch, other, reason):
+def test_messages_with_another_layout_are_serialised_by_ros_and_reported(monkeypatch, other, reason):
     aircraft = build()
     chance = np.random.default_rng(1)
     now, messages, lines = snapshot(aircraft, chance), StateMessages(aircraft), []
@@ -198,7 +198,7 @@ def test_a_number_that_is_there_twice_is_refused(monkeypatch):
         Template(Vector3(), {"x": DOUBLE})
 
 
-def test_a_place_that_ros_does_not_read_is_refused(monkeypatch):
+def test_an_offset_that_ros_does_not_read_is_refused(monkeypatch):
     monkeypatch.setattr(templates, "deserialize_message", lambda data, kind: kind())
     with pytest.raises(LayoutError, match=r"^Vector3: ROS does not read what was written into its bytes$"):
         Template(Vector3(), {"x": DOUBLE})

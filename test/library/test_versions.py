@@ -42,7 +42,7 @@ def test_the_target_is_the_hosts_unless_the_environment_says_otherwise():
         ({"NUMBA_DISABLE_JIT": "1"}, {"target": "interpreter", "optimisation": ""}),
     ],
 )
-def test_what_the_environment_sets_is_told_and_decides_nothing(environment, changed):
+def test_what_the_environment_sets_is_reported_and_decides_nothing(environment, changed):
     own, around = told_in()
     assert told_in(**environment) == [own, {**around, **changed}]
 

@@ -144,7 +144,7 @@ def test_the_forces_of_a_trimmed_hover_carry_the_weight(client):
         assert rotor.hub.force.z == pytest.approx(-rotor.thrust + 3 * 0.1613 * 9.80665, rel=1e-3)
 
 
-def test_answers_tell_where_the_model_does_not_hold(client):
+def test_answers_say_where_the_model_does_not_hold(client):
     ring = [f"{name}: vortex ring state, where momentum theory does not hold" for name in ("MR1", "MR2")]
     found = client.call(Trim, "trim", climb_rate=-7.0)
     assert found.warnings == found.trim.warnings == ring
@@ -157,7 +157,7 @@ def test_answers_tell_where_the_model_does_not_hold(client):
     assert client.call(Trim, "trim").warnings == client.call(Linearize, "linearize").warnings == []
 
 
-def test_the_cockpit_is_told_it_with_what_it_asks_for(flight):
+def test_the_answers_to_the_cockpit_say_so_too(flight):
     page, done = Client(flight.domain, "page"), threading.Event()
     pilot = RemotePilot(page.node)
 
@@ -172,12 +172,12 @@ def test_the_cockpit_is_told_it_with_what_it_asks_for(flight):
         while pilot.trim(TrimCondition())[0] is None or pilot.linearize(TrimCondition())[0] is None:
             assert time.monotonic() < end
             time.sleep(0.05)  # the services have not been discovered yet
-        told = [ask(TrimCondition(0.0, -7.0)) for ask in (pilot.trim, pilot.linearize)]
+        reported = [ask(TrimCondition(0.0, -7.0)) for ask in (pilot.trim, pilot.linearize)]
     finally:
         done.set()
         server.join()
         page.close()
-    for trimmed, text in told:
+    for trimmed, text in reported:
         assert text == ""
         assert trimmed.notes == tuple(
             f"outside the model's validity: {name}: vortex ring state, where momentum theory does not hold"
@@ -185,7 +185,7 @@ def test_the_cockpit_is_told_it_with_what_it_asks_for(flight):
         )
 
 
-def test_a_trim_beyond_the_limits_is_told(client):
+def test_a_trim_beyond_the_limits_is_reported(client):
     found = client.call(Trim, "trim", airspeed=50.0)
     assert found.success
     assert "collective = " in found.trim.beyond_limits[0]
@@ -287,7 +287,7 @@ def test_the_latest_results_wait_for_a_late_subscriber(flight, client):
 # --- sweeps -----------------------------------------------------------------------------------------------------
 
 
-def test_a_sweep_tells_every_point_and_goes_on_where_there_is_no_trim(client, aircraft):
+def test_a_sweep_reports_every_point_and_goes_on_where_there_is_no_trim(client, aircraft):
     values = [0.0, 5.0, 95.0, 10.0]
     goal = client.send_goal(Sweep, "sweep", values=values, climb_rate=0.5, azimuth_count=6)
     status, result = goal.end()
@@ -368,7 +368,7 @@ def test_there_is_one_sweep_at_a_time(client):
         ({"values": [0.0] * 1001}, "values: 1001 of them, allowed are 1 to 1000"),
     ],
 )
-def test_a_wrong_goal_is_told_in_one_line(client, goal_fields, said):
+def test_a_wrong_goal_is_reported_in_one_line(client, goal_fields, said):
     status, result = client.send_goal(Sweep, "sweep", **goal_fields).end()
     assert status == GoalStatus.STATUS_ABORTED
     assert not result.success
@@ -424,7 +424,7 @@ def test_an_interruption_does_not_wait_for_a_long_computation(own_world):
     assert "Traceback" not in process.output
 
 
-def test_an_error_of_ours_is_told_and_ends_nothing(monkeypatch, aircraft):
+def test_an_error_of_ours_is_reported_and_ends_nothing(monkeypatch, aircraft):
     from sbs_sim.nodes import analysis
 
     def broken(*_, **__):

@@ -41,7 +41,7 @@ def now(client):
     return nanoseconds(client.next("state"))
 
 
-def told(client, text):
+def reported(client, text):
     return lambda array: (
         (status := mixer_status(array)) and status.level == DiagnosticStatus.WARN and text in status.message
     )
@@ -86,7 +86,7 @@ def test_a_clock_that_has_been_put_back_is_taken_after_a_while(flight, hover):
 @pytest.mark.parametrize(
     ("age", "text"), [(2.0, "controls stamped up to "), (-1.7e9, "s ahead of /clock, not by use_sim_time")]
 )
-def test_stamps_far_from_the_simulation_time_are_taken_and_told(flight, hover, age, text):
+def test_stamps_far_from_the_simulation_time_are_taken_and_reported(flight, hover, age, text):
     client = flight.client
     client.spin(0.8)  # whatever the test before has stamped
     stamp = now(client) - round(age * 1e9)
@@ -94,7 +94,7 @@ def test_stamps_far_from_the_simulation_time_are_taken_and_told(flight, hover, a
         client.until(lambda: now(client) > 2.2e9, "time")
         stamp = now(client) - round(age * 1e9)
     client.publish("controls", stamped(hover, stamp))
-    client.next("diagnostics", told(client, text))
+    client.next("diagnostics", reported(client, text))
 
 
 def test_two_pilots_are_named_and_a_lost_one_is_missed(flight, hover):
@@ -103,13 +103,14 @@ def test_two_pilots_are_named_and_a_lost_one_is_missed(flight, hover):
     other = rclpy.create_node("other_pilot", context=client._context)
     second = other.create_publisher(Controls, "controls", QoSProfile(depth=1))
     client.next(
-        "diagnostics", told(client, "2 publishers of controls, the newest command counts: /other_pilot, /test_client")
+        "diagnostics",
+        reported(client, "2 publishers of controls, the newest command counts: /other_pilot, /test_client"),
     )
     other.destroy_publisher(second)
     other.destroy_node()
     client.next("diagnostics", lambda a: (s := mixer_status(a)) and "publishers of controls" not in s.message)
     client.node.destroy_publisher(client._publishers.pop("controls"))
-    client.next("diagnostics", told(client, "controls has lost its publisher, the last command is held"))
+    client.next("diagnostics", reported(client, "controls has lost its publisher, the last command is held"))
 
 
 def test_a_killed_mixer_is_missed_and_a_new_one_joins(tmp_path, hover):

@@ -235,8 +235,8 @@ def test_pause_step_and_play(simulation):
         assert loop.step(5) == pytest.approx(simulation.time)
         assert loop.call(lambda: simulation.step) == at + 5 * tick
         wait_until(lambda: reader.newest().step == at + 5 * tick)
-        told = [snapshot.step for snapshot in reader.snapshots()]
-        assert told[-5:] == [at + i * tick for i in range(1, 6)]
+        reported = [snapshot.step for snapshot in reader.snapshots()]
+        assert reported[-5:] == [at + i * tick for i in range(1, 6)]
         assert not reader.newest().playing
         loop.pause(True)  # once more changes nothing
         assert loop.call(lambda: simulation.step) == at + 5 * tick
@@ -445,7 +445,7 @@ def test_a_fault_pauses_until_a_reset(falling):
         assert reader.newest().playing
 
 
-def test_a_fault_while_stepping_is_told_to_the_caller(falling):
+def test_a_fault_while_stepping_is_reported_to_the_caller(falling):
     with flying(falling, real_time_factor=1e-5) as (loop, reader):
         loop.pause(True)
         line = refusal(loop.step, 100)
@@ -527,15 +527,15 @@ def test_all_requests_at_once_from_many_threads(sbs, hover, simulation):
 @contextlib.contextmanager
 def held_up(loop):
     """A flight that is busy with the request of somebody else."""
-    begun, end = threading.Event(), threading.Event()
+    started, end = threading.Event(), threading.Event()
 
     def hold():
-        begun.set()
+        started.set()
         assert end.wait(PATIENCE)
 
     holder = threading.Thread(target=lambda: loop.call(hold, PATIENCE), daemon=True)
     holder.start()
-    assert begun.wait(PATIENCE)
+    assert started.wait(PATIENCE)
     yield
     end.set()
     holder.join(PATIENCE)
@@ -652,19 +652,19 @@ def test_many_steps_are_reported_one_by_one_and_let_others_in(simulation):
     with taken(simulation, real_time_factor=1e-5) as (loop, reader):
         loop.pause(True)
         first, tick = loop.call(lambda: simulation.step), simulation.steps_per_tick
-        begun, met = threading.Event(), []
+        started, met = threading.Event(), []
         take = reader.take
 
         def watch(report):
             if report.step > first + 5 * tick:
-                begun.set()
+                started.set()
                 time.sleep(0.001)  # steps on a slow machine
             return take(report)
 
         loop.read_by(watch)
         stepper = threading.Thread(target=lambda: loop.step(400), daemon=True)
         stepper.start()
-        assert begun.wait(PATIENCE)
+        assert started.wait(PATIENCE)
         loop.call(lambda: met.append(simulation.step))
         stepper.join(PATIENCE)
         assert not stepper.is_alive()
@@ -746,7 +746,7 @@ def test_after_the_end_requests_are_refused_at_once(simulation):
 
 
 def test_requests_under_way_at_the_end_are_answered(simulation):
-    """A caller that waits is told, not left waiting."""
+    """A caller that waits gets an answer."""
     loop = FlightLoop(simulation)
     loop.start()
     lines = []

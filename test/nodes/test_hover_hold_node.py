@@ -125,7 +125,7 @@ def test_what_is_no_target_is_refused_by_name(message, text):
         (pose("ned", (150, 0, 0), (1, 0, 0, 0)), "m: allowed are 0 to 100 m"),
     ],
 )
-def test_a_refused_target_is_told_and_moves_nothing(flight, client, message, text):
+def test_a_refused_target_is_reported_and_moves_nothing(flight, client, message, text):
     before = place_of(client.next("state"))
     client.spin(1.1)  # such warnings come once a second
     client.publish("target", message)

@@ -183,7 +183,7 @@ def test_odom_is_the_same_motion_in_ros_axes(client):
     np.testing.assert_allclose(vector(odom.pose.pose.position), to_enu @ vector(state.position), atol=1e-12)
     np.testing.assert_allclose(vector(odom.twist.twist.linear), to_flu @ vector(state.velocity), atol=1e-12)
     np.testing.assert_allclose(vector(odom.twist.twist.angular), to_flu @ body_rates(state), atol=1e-12)
-    # 8 m/s on heading 0.7: north and east, as told
+    # 8 m/s on heading 0.7: north and east, as commanded
     np.testing.assert_allclose((ned_frd @ vector(state.velocity))[2], 0.0, atol=0.05)
 
 
@@ -401,19 +401,19 @@ def test_a_fault_pauses_and_a_reset_cures_it(flight, client):
     assert flight.simulator.running
 
 
-def test_the_status_tells_where_the_model_does_not_hold_and_when_it_does_again(flight, client):
+def test_the_status_says_where_the_model_does_not_hold_and_when_it_does_again(flight, client):
     assert client.call(Reset, "reset").success
     calm = client.next("status", lambda m: len(m.working_states) == 2 and not m.warnings)
     assert [state.inflow_state for state in calm.working_states] == [WorkingState.NORMAL] * 2
     assert client.call(SetWind, "set_wind", velocity=Vector3(z=-7.0)).success
-    told = client.next("status", lambda m: m.warnings)
-    assert told.warnings == [
+    reported = client.next("status", lambda m: m.warnings)
+    assert reported.warnings == [
         f"{name}: vortex ring state, where momentum theory does not hold" for name in ("MR1", "MR2")
     ]
-    assert [state.inflow_state for state in told.working_states] == [WorkingState.VORTEX_RING] * 2
-    assert all(0.45 < state.descent_ratio < 1.5 for state in told.working_states)
-    assert all(state.tip_mach == pytest.approx(0.373, abs=0.01) for state in told.working_states)
-    assert all(state.outside_share == 0.0 for state in told.working_states)
+    assert [state.inflow_state for state in reported.working_states] == [WorkingState.VORTEX_RING] * 2
+    assert all(0.45 < state.descent_ratio < 1.5 for state in reported.working_states)
+    assert all(state.tip_mach == pytest.approx(0.373, abs=0.01) for state in reported.working_states)
+    assert all(state.outside_share == 0.0 for state in reported.working_states)
     health = client.next("diagnostics", lambda m: any("vortex ring" in status.message for status in m.status))
     assert health.status[0].level == DiagnosticStatus.WARN
     assert client.call(SetWind, "set_wind").success
@@ -498,8 +498,8 @@ def test_controls_of_other_names_are_commanded_by_name_and_by_axis(own_world, tm
     wrong = ControlValues(names=["lever"], values=[math.nan])
     before = rejected_messages(client)
     client.publish("control_values", wrong)
-    told = client.next("diagnostics", lambda m: (rejected_in(m) or 0) > before)
-    reasons = [v.value for v in status_of(told, "control_mixer").values if v.key == "last_rejection"]
+    reported = client.next("diagnostics", lambda m: (rejected_in(m) or 0) > before)
+    reasons = [v.value for v in status_of(reported, "control_mixer").values if v.key == "last_rejection"]
     assert reasons[0].startswith("lever = nan: allowed are")
 
 
@@ -531,25 +531,25 @@ def test_namespaces_remaps_and_a_name_of_its_own(own_world):
     # a mixer in a process of its own follows the clock of its namespace
     wanted = trim(Aircraft.load("sbs")).controls + [DEGREE, 0, 0, 0]
     client.publish_until("/right/controls", controls_message(wanted), "/right/state", lambda m: m.velocity.z < -0.1)
-    told = client.next("/right/diagnostics", lambda m: stamp(m) > 0.0 and status_of(m, "control_mixer"))
-    assert "nobody" not in told.status[0].message
+    reported = client.next("/right/diagnostics", lambda m: stamp(m) > 0.0 and status_of(m, "control_mixer"))
+    assert "nobody" not in reported.status[0].message
     assert mixer.running
     assert "too" not in left.output
     assert "same name" not in left.output  # as ROS complains of two nodes of one name
 
 
-def test_a_second_simulator_on_the_same_names_is_told(own_world):
+def test_a_second_simulator_on_the_same_names_is_reported(own_world):
     client = own_world.client
     client.watch("diagnostics", DiagnosticArray)
     first = own_world.start("simulator", components="[simulator]", record="off")
 
-    def told(array, name="simulator"):
+    def reported(array, name="simulator"):
         status = status_of(array, name)
         return status and "/simulator publishes /clock, " in status.message
 
     client.next("diagnostics", lambda m: (s := status_of(m, "simulator")) and s.level == DiagnosticStatus.OK)
     second = own_world.start("simulator", components="[simulator]", record="off")
-    array = client.next("diagnostics", told)
+    array = client.next("diagnostics", reported)
     assert status_of(array, "simulator").level == DiagnosticStatus.WARN
     assert "/state, " in array.status[0].message
     assert "-r __ns:=" in array.status[0].message

@@ -114,7 +114,7 @@ os.write(1, b"and more")
 
 
 @pytest.mark.parametrize("mode", ["pipe", "file", "closed", "terminal"])
-def test_what_is_read_arrives_whole_and_the_output_of_others_keeps_its_flags(tmp_path, mode):
+def test_what_is_read_arrives_completely_and_the_output_of_others_keeps_its_flags(tmp_path, mode):
     command = [sys.executable, "-c", PRINTS]
     if mode == "closed":
         ended = subprocess.run(["sh", "-c", 'exec "$0" "$@" >&- 2>&-', *command], check=False)

@@ -201,7 +201,7 @@ def test_a_wrong_file_is_one_line(tmp_path, old, new, text):
     assert "\n" not in str(error.value)
 
 
-def test_a_file_or_pad_that_is_not_there_is_told(tmp_path):
+def test_a_file_or_pad_that_is_not_there_is_reported(tmp_path):
     with pytest.raises(PilotError, match="there is no such file"):
         JoystickFile.load(str(tmp_path / "none.yaml"), "gamepad")
     with pytest.raises(PilotError, match=f"pad = 'steering wheel': allowed are {', '.join(PADS)}"):

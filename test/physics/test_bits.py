@@ -40,21 +40,21 @@ def test_trims_linear_models_and_flights_have_the_same_bits_in_other_ways():
     assert [line.split()[1] for line in lines if line.startswith("sbs ")] == ["trim", "A", "etd"] * len(WAYS)
 
 
-def test_azimuths_that_are_told_are_those_that_are_flown(sbs, hover):
+def test_reported_azimuths_are_those_that_are_flown(sbs, hover):
     simulation = Simulation(sbs, trimmed_state(sbs, hover), hover.swashplate)
     simulation.step = 10_000_003  # some days, so that every rounding shows
     simulation.set_wind(Wind())
     for _ in range(20):
         simulation.advance()
         # the last stage of a step stands where the next one begins
-        told = simulation.azimuths(np.array([simulation.step]))[0]
-        assert told.tobytes() == simulation.engine.tick.psi[:, 0].tobytes()
+        reported = simulation.azimuths(np.array([simulation.step]))[0]
+        assert reported.tobytes() == simulation.engine.tick.psi[:, 0].tobytes()
     every = simulation.azimuths(np.arange(200_000, dtype=np.int64) * 1009)
     assert every.min() >= 0.0
     assert every.max() <= 2.0 * np.pi
 
 
-def test_angles_that_are_told_together_are_those_of_one_attitude(sbs, hover):
+def test_angles_reported_together_are_those_of_one_attitude(sbs, hover):
     flown = simulate(sbs, hover, hover.controls, 0.2, wind=Wind(gust=(5.0, 3.0, 2.0), gust_duration=0.2))
     attitudes = flown["state"][:, 3:7]
     angles = np.stack([flown["psi"], flown["theta"], flown["phi"]], axis=1)

@@ -365,7 +365,7 @@ def test_side_by_side_rotors_are_images_of_each_other(hover):
 
 @pytest.mark.parametrize("heading", [0.7, np.pi, -2.5])
 def test_flights_in_another_heading_are_the_same_in_body_axes(sbs, hover, heading):
-    """One second, turned with its wind and begun elsewhere: position turned, everything else the same."""
+    """One second, turned with its wind and started elsewhere: position turned, everything else the same."""
     model = Model(sbs)
     x, swash = disturbed(model, hover)
     wind, start = np.array([2.0, -1.0, 0.5]), np.array([100.0, -50.0, -30.0])

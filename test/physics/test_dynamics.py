@@ -301,7 +301,7 @@ def test_mirrored_aircraft_has_the_mirrored_derivative(seed, name):
 
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), heading=st.floats(-np.pi, np.pi), drift=st.floats(-30.0, 30.0))
-def test_heading_place_and_common_motion_do_not_matter(sbs, seed, heading, drift):
+def test_heading_position_and_common_motion_do_not_matter(sbs, seed, heading, drift):
     """Aircraft and air turned, moved and carried along together: nothing changes in body axes."""
     model = Model(sbs)
     x, swash, psi, wind = random_case(sbs, seed)

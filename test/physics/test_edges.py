@@ -62,7 +62,7 @@ def held(simulation, seconds):
 
 
 def end_of(simulation, seconds=10.0):
-    """What ends a flight early; all that is told of it is finite as long as it lasts."""
+    """What ends a flight early; all that is reported of it is finite as long as it lasts."""
     try:
         for _ in range(round(seconds / simulation.tick)):
             simulation.advance()
@@ -254,7 +254,7 @@ def test_a_dented_airfoil_does_not_stall_in_hover(sbs, hover):
     assert [state.stalled_share for state in states(hovering(dented, hover).snapshot())] == [0.0, 0.0]
 
 
-def test_all_of_a_disc_that_stands_across_the_wind_is_stalled(sbs, hover):
+def test_all_of_a_disc_at_rest_across_the_wind_is_stalled(sbs, hover):
     """At 90 m/s from below the angle of attack is beyond 30 deg even at the tip, which goes at 127 m/s."""
     snapshot = hovering(sbs, hover, wind=Wind(velocity=(0.0, 0.0, -90.0))).snapshot()
     assert all(state.stalled_share == pytest.approx(1.0) for state in states(snapshot))
@@ -288,7 +288,7 @@ WAKE = [line.replace("vortex ring", "turbulent wake") for line in RING]
 MACH = [f"{name}: tip Mach number above 0.44, where incompressible section data do not hold" for name in ("MR1", "MR2")]
 
 
-def test_trims_and_all_that_stands_on_them_say_where_the_model_does_not_hold(sbs, hover):
+def test_trims_and_all_that_is_based_on_them_say_where_the_model_does_not_hold(sbs, hover):
     """-7 m/s is about one hover inflow velocity down: the middle of the ring; -20 m/s is behind it."""
     assert hover.warnings == linearize(sbs, point=hover).warnings == ()
     ring, wake = trim(sbs, climb_rate=-7.0), trim(sbs, climb_rate=-20.0)
@@ -330,14 +330,14 @@ def test_looking_changes_no_bit(sbs, hover):
         assert simulation.state.tobytes() == row.tobytes()
 
 
-@pytest.mark.parametrize(("rpm", "told"), [(2700.0, []), (2900.0, MACH), (4000.0, MACH)])
-def test_mach_numbers_that_the_sections_do_not_have_are_told(sbs, rpm, told):
+@pytest.mark.parametrize(("rpm", "reported"), [(2700.0, []), (2900.0, MACH), (4000.0, MACH)])
+def test_mach_numbers_that_the_sections_do_not_have_are_reported(sbs, rpm, reported):
     """0.44 times 340.3 m/s is 149.7 m/s: the tips of 0.505 m go faster from 2831 rpm on."""
     fast = sbs.with_value("rotors.speed_rpm", rpm)
     point = trim(fast)
-    assert [line for line in point.warnings if "Mach" in line] == told
+    assert [line for line in point.warnings if "Mach" in line] == reported
     snapshot = hovering(fast, point).snapshot()
-    assert [line for line in warnings(fast, snapshot.working) if "Mach" in line] == told
+    assert [line for line in warnings(fast, snapshot.working) if "Mach" in line] == reported
     expected = rpm * math.pi / 30 * 0.505 / 340.3
     for rotor, row in zip(fast.rotors, snapshot.working, strict=True):
         assert tip_mach(fast, rotor, row) == pytest.approx(expected, rel=1e-9)
@@ -358,7 +358,7 @@ def test_the_advancing_tip_and_the_speed_of_sound_count(sbs):
     assert Aircraft.from_dict(data).environment.speed_of_sound == 340.3
 
 
-def test_reynolds_numbers_that_the_table_does_not_have_are_told(sbs):
+def test_reynolds_numbers_that_the_table_does_not_have_are_reported(sbs):
     """In air that is ten times as viscous all sections are below 50000; in one of four times those up to 57.3 m/s.
 
     Those lie within 0.228 m, which is 18.6 % of the disc between the flap hinge and the tip.
@@ -413,16 +413,16 @@ def test_of_a_table_over_the_mach_number_its_range_counts_and_the_speed_of_sound
 
 @pytest.mark.parametrize("air", AIRS)
 def test_rotors_come_back_from_every_air(sbs, hover, air):
-    """Three seconds on a stand in that air, six in calm: the thrust is that of hover again, and nothing is told."""
+    """Three seconds on a stand in that air, six in calm: the thrust is that of hover again, and nothing is reported."""
     simulation = hovering(sbs, hover, wind=Wind(velocity=AIRS[air]))
-    told = set()
+    reported = set()
     for snapshot in held(simulation, 3.0):
         assert np.isfinite(snapshot.state).all()
         assert np.isfinite(snapshot.loads).all()
         assert np.isfinite(snapshot.working).all()
-        told.update(warnings(sbs, snapshot.working))
+        reported.update(warnings(sbs, snapshot.working))
     if air in ("vortex ring", "turbulent wake", "reverse flow"):
-        assert any(air in line for line in told)
+        assert any(air in line for line in reported)
     simulation.set_wind(Wind())
     *_, last = held(simulation, 6.0)
     assert warnings(sbs, last.working) == []
@@ -482,11 +482,11 @@ def test_a_falling_aircraft_touches_the_ground_with_its_lowest_point(sbs, hover,
         x, y, z = rotor.hub
         down = -x * math.sin(pitch) + (y * math.sin(roll) + z * math.cos(roll)) * math.cos(pitch)
         reach = max(reach, down + rotor.radius * math.sqrt(1.0 - (math.cos(roll) * math.cos(pitch)) ** 2))
-    simulation, told = fall(sbs, hover, -2.0, attitude)
+    simulation, reported = fall(sbs, hover, -2.0, attitude)
     expected = math.sqrt(2 * (2.0 - reach) / sbs.environment.gravity)
     assert simulation.time == pytest.approx(expected, abs=simulation.step_size + 2e-3)
     speed = sbs.environment.gravity * simulation.time
-    assert told == (
+    assert reported == (
         f"ground contact after step {simulation.step} (t = {simulation.time:.4f} s) at {speed:.3g} m/s:"
         " the ground is at -2 m"
     )
@@ -508,7 +508,7 @@ def test_nothing_begins_below_the_ground(sbs, hover):
         hovering(sbs, hover, ground_altitude=math.nan)
 
 
-def test_a_whole_flight_ends_at_the_same_step(sbs, hover):
+def test_a_complete_flight_ends_at_the_same_step(sbs, hover):
     """`simulate`, tick by tick, and flown again from its events."""
     controls = hover.controls * [0.5, 1.0, 1.0, 1.0]
     simulation = hovering(sbs, hover, ground_altitude=-3.0)

@@ -399,7 +399,7 @@ def test_quaternion_stays_a_rotation(sbs, hover):
     assert np.linalg.norm(x[S.ATTITUDE : S.VELOCITY]) == pytest.approx(1.0, abs=1e-14)
 
 
-def test_rotors_turn_for_hours_without_losing_their_place(sbs, hover):
+def test_rotors_turn_for_hours_without_losing_their_phase(sbs, hover):
     """A flight that begins at step 10^9 (four days) after whole revolutions is the one from step 0."""
     model = Model(sbs)
     x, swash = disturbed(model, hover)

@@ -92,7 +92,7 @@ PLAIN = """
 
 def test_everything_works_without_the_compiler_too():
     """NUMBA_DISABLE_JIT is how one steps through the model: the same numbers but for rounding."""
-    told, numbers = [], []
+    reported, numbers = [], []
     for disabled in ("0", "1"):
         environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
         code = textwrap.dedent(PLAIN)
@@ -101,8 +101,8 @@ def test_everything_works_without_the_compiler_too():
         )
         assert run.returncode == 0, run.stderr
         line, values = run.stdout.splitlines()
-        told.append(line)
+        reported.append(line)
         numbers.append([float(value) for value in values.split()])
-    assert told == ["(None,) None ()"] * 2
+    assert reported == ["(None,) None ()"] * 2
     assert len(numbers[0]) > 1000
     assert numbers[1] == pytest.approx(numbers[0], rel=1e-6, abs=1e-6)

@@ -1,4 +1,4 @@
-"""What is told of a flight besides its state, against its definition: working states of rotors, the lowest point."""
+"""Reports of a flight besides its state, against their definitions: working states of rotors, the lowest point."""
 
 import math
 

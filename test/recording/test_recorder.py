@@ -203,7 +203,7 @@ def test_a_full_disk_does_not_stop_the_flight(tmp_path, hover):
     assert len(read(tmp_path / "a.mcap")["state"].time_ns) > 10
 
 
-def test_a_disk_that_is_full_at_the_very_end_is_told(tmp_path):
+def test_a_disk_that_is_full_at_the_very_end_is_reported(tmp_path):
     with world(next(DOMAINS), tmp_path) as made:
         made.client.watch("status", SimulationStatus)
         simulator = made.start("simulator", record=tmp_path / "a.mcap", components="[simulator, recorder]")
@@ -216,7 +216,7 @@ def test_a_disk_that_is_full_at_the_very_end_is_told(tmp_path):
     assert f"the log ends before the flight: cannot write {tmp_path / 'a.mcap'}: File too large" in simulator.output
 
 
-def test_a_log_that_is_deleted_or_moved_is_told(tmp_path, hover):
+def test_a_log_that_is_deleted_or_moved_is_reported(tmp_path, hover):
     """Also while the flight is paused, when nothing but the heartbeat is published, and nothing new is recorded."""
     first, second, moved = (tmp_path / f"{name}.mcap" for name in ("first", "second", "moved"))
     with world(next(DOMAINS), tmp_path) as made:
@@ -261,7 +261,7 @@ def test_a_log_that_is_deleted_or_moved_is_told(tmp_path, hover):
 
 
 @pytest.mark.parametrize("signals", [[signal.SIGHUP], [signal.SIGINT, signal.SIGTERM]])
-def test_a_log_is_whole_however_the_end_is_asked_for(tmp_path, signals):
+def test_a_log_is_complete_however_its_end_is_asked_for(tmp_path, signals):
     """A terminal that is closed; somebody who is in a hurry."""
     with world(next(DOMAINS), tmp_path) as made:
         made.client.watch("state", BodyState)
@@ -274,7 +274,7 @@ def test_a_log_is_whole_however_the_end_is_asked_for(tmp_path, signals):
     assert "Traceback" not in simulator.output
 
 
-def test_a_log_that_has_just_begun_is_whole(tmp_path):
+def test_a_log_that_was_just_started_is_complete(tmp_path):
     """Interrupted while all the rest is made: there is a whole log, or none yet."""
     path = tmp_path / "a.mcap"
     with world(next(DOMAINS), tmp_path) as made:
@@ -320,7 +320,7 @@ def test_interruptions_that_arrive_at_once_end_a_command_without_a_word():
     assert (found.stdout, found.stderr) == ("interrupted once True\n", "")
 
 
-def test_an_interruption_in_a_long_computation_leaves_a_whole_log(tmp_path):
+def test_an_interruption_in_a_long_computation_leaves_a_complete_log(tmp_path):
     with world(next(DOMAINS), tmp_path) as made:
         made.client.watch("status", SimulationStatus)
         simulator = made.start("simulator", record=tmp_path / "a.mcap")
@@ -395,8 +395,8 @@ def test_pause_steps_resets_and_wind_come_again_bit_for_bit(tmp_path, hover):
 # -- recording in flight -----------------------------------------------------------------------------------------------
 
 
-def test_logs_begun_in_mid_flight_come_again_bit_for_bit(tmp_path, hover):
-    """Turbulence and a gust have begun before the log; the azimuths stand anywhere."""
+def test_logs_started_in_mid_flight_are_repeated_bit_for_bit(tmp_path, hover):
+    """Turbulence and a gust have started before the log; the azimuths are arbitrary."""
     first, second = tmp_path / "first.mcap", tmp_path / "second.mcap"
     with world(next(DOMAINS), tmp_path) as made:
         client = made.client
@@ -419,7 +419,7 @@ def test_logs_begun_in_mid_flight_come_again_bit_for_bit(tmp_path, hover):
         assert client.call(Record, "record", record=True, path=str(second)).success
         wiggle(made, hover, 0.4)
         assert simulator.interrupt() == 0, simulator.output
-    assert [event.kind for event in events].count("start") == 1  # for everybody else the flight has begun once
+    assert [event.kind for event in events].count("start") == 1  # for everybody else the flight has started once
     for path in (first, second):
         log = read(path)
         assert log.complete
@@ -432,7 +432,7 @@ def test_logs_begun_in_mid_flight_come_again_bit_for_bit(tmp_path, hover):
     assert read(second)["state"].time[0] > read(first)["state"].time[-1]
 
 
-def test_logs_that_end_as_they_have_begun_come_again(tmp_path):
+def test_logs_that_end_at_the_step_of_their_start_are_repeated(tmp_path):
     """Each with its own start and states, though what is published before them is still on its way."""
     with world(next(DOMAINS), tmp_path) as made:
         made.client.watch("status", SimulationStatus)
@@ -475,7 +475,7 @@ def test_a_log_that_begins_while_paused_after_a_fault_comes_again(tmp_path):
     assert_identical(path)
 
 
-def test_a_log_begun_in_mid_flight_flies_with_a_changed_aircraft(tmp_path, hover):
+def test_a_log_started_in_mid_flight_flies_with_a_changed_aircraft(tmp_path, hover):
     path, heavy = tmp_path / "mid.mcap", tmp_path / "heavy.mcap"
     with world(next(DOMAINS), tmp_path) as made:
         made.client.watch("status", SimulationStatus)
@@ -570,7 +570,7 @@ def test_commands_past_the_mixer_come_again(tmp_path, hover):
 
 
 def test_a_changed_log_is_found_out(tmp_path, hover):
-    """Another command in the middle: the first difference is told, and the exit code."""
+    """Another command in the middle: the first difference is reported, and the exit code."""
     flight = flight_of(read(fly(tmp_path, lambda made: wiggle(made, hover, 0.5))))
     assert verify(flight).identical
     state = flight.states[len(flight.states) // 2]

@@ -176,7 +176,7 @@ def test_events_must_begin_with_the_start(sbs, hover):
         next(refly(sbs, [Event(0, "swashplate", swashplate=hover.swashplate)], 10))
 
 
-def test_a_fault_without_cure_is_told(sbs, hover):
+def test_a_fault_without_cure_is_reported(sbs, hover):
     wild = trimmed_state(sbs, hover)
     wild[sbs.layout.flap_rate(0)] = 900.0
     with pytest.raises(SimulationError, match="would take"):

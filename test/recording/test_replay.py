@@ -223,7 +223,7 @@ def test_an_interrupted_command_leaves_nothing_and_says_nothing(tmp_path, record
         if process.returncode == 130:
             assert printed == ""
             assert not output.exists()
-        else:  # it had ended, or Python itself had only begun
+        else:  # it had ended, or Python itself had only just started
             assert process.returncode in (0, -first, -second)
 
 
@@ -393,7 +393,7 @@ def test_messages_that_are_none_are_left_out_and_all_others_are_played(tmp_path)
     assert lines[-1] == f"{path}: messages that are not of their type were left out: {counts}"
 
 
-def test_two_flights_in_one_file_are_told_and_can_be_chosen(tmp_path, recorded):
+def test_two_flights_in_one_file_are_listed_and_can_be_chosen(tmp_path, recorded):
     heavy, both = tmp_path / "heavy.mcap", tmp_path / "both.mcap"
     fly_with(flight_of(read(recorded)), ["body.mass=23"], 10**6, heavy)
     merge(both, recorded, heavy)

@@ -108,7 +108,7 @@ def values(present: Any, type_name: str, rate: int) -> Any:
 
 
 class Live:
-    """A client of a running system that has been told to stand anything.
+    """A client of a running system that must survive anything.
 
     Parameters
     ----------
@@ -390,15 +390,15 @@ class Page:
         )
 
     def _known(self) -> set[str]:
-        """Names of all that can be pressed or moved, from what a new page is told."""
+        """Names of all that can be pressed or moved, from what a new page is sent."""
         found: set[str] = set()
         end = time.monotonic() + 3.0
         while time.monotonic() < end:
             with contextlib.suppress(TimeoutError):
                 data = self._socket.recv(timeout=0.5)
                 size = int.from_bytes(data[8:16], "little")
-                told = msgspec.msgpack.decode(zstandard.decompress(data[16 : 16 + size]))
-                found |= {item["uuid"] for item in told["messages"] if "uuid" in item}
+                reported = msgspec.msgpack.decode(zstandard.decompress(data[16 : 16 + size]))
+                found |= {item["uuid"] for item in reported["messages"] if "uuid" in item}
         return found
 
     def check_request(self, data: bytes) -> None:

@@ -7,7 +7,7 @@
 A way compiles the model anew into a folder of its own, for numba does not ask whether machine code that it finds was
 optimised otherwise; ways that differ in the libraries alone (numpy, BLAS) take what "native" has compiled. Ways that
 this machine cannot execute are left out. The exit code is 1 if a digest differs, or if a flight in a batch differs from
-the flight by itself. Digests of what stands on eigenvalues of LAPACK are shown, and may differ.
+the flight by itself. Digests of what depends on eigenvalues of LAPACK are shown, and may differ.
 """
 
 import argparse
@@ -79,7 +79,7 @@ AIR = Wind(
     turbulence_intensity=(1.0, 1.5, 0.5), turbulence_direction=0.3, turbulence_seed=3,
 )  # fmt: skip
 POLAR = ([-1.0, -0.6, 0.0, 0.6, 1.0], [0.03, 0.01, 0.008, 0.01, 0.03])  # lift and drag
-LIBRARIES = ("monodromy", "multipliers", "modes")  # stand on exponentials of matrices or eigenvalues of LAPACK
+LIBRARIES = ("monodromy", "multipliers", "modes")  # are computed with exponentials of matrices or eigenvalues of LAPACK
 
 
 def main() -> int:
@@ -189,7 +189,7 @@ def own_features() -> set[str]:
 
 
 def _of_process(way: str, folder: Path, arguments: list[str], kept: bool) -> dict[str, str]:
-    """Digests by their titles; they are told as soon as they are there."""
+    """Digests by their titles; they are printed as soon as they are there."""
     variables = {"NUMBA_OPT": "3", **WAYS[way]}
     anew = way if variables.pop(OWN, None) is not None else "native"
     if anew != "native" or not kept:
@@ -203,7 +203,7 @@ def _of_process(way: str, folder: Path, arguments: list[str], kept: bool) -> dic
 
 
 def _told(found: dict[str, dict[str, str]]) -> bool:
-    """True if something differs that must not; what differs is told."""
+    """True if something differs that must not; what differs is printed."""
     first, *others = found
     wrong = False
     for way in others:

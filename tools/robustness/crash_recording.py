@@ -4,7 +4,7 @@
 
 A process that records a flight (six topics of the simulator's sizes, 100 Hz or slower or as fast as it can) is killed
 with SIGKILL at a random moment; the time between the last message that is recovered and the kill is what was lost.
-Then a recording is cut, overwritten, or bytes are put in or taken out at random places; what is recovered is compared
+Then a recording is cut, overwritten, or bytes are inserted or removed at random offsets; what is recovered is compared
 with the original: nothing may be there that was not recorded, and every chunk that was not touched must be there.
 The exit code is 1 if one of these does not hold or a kill costs more than half a second.
 """
@@ -71,8 +71,8 @@ def kill_many(folder: Path, count: int, chance: random.Random) -> bool:
 
 
 def kill_one(path: Path, tick: float, after: float) -> float | None:
-    """Kill a recorder; seconds of flight that were lost, None if there was nothing to lose more than it had begun."""
-    begun = time.monotonic_ns()
+    """Kill a recorder; seconds of flight that were lost, None if it had not written anything yet."""
+    begin = time.monotonic_ns()
     child = os.fork()
     if child == 0:
         try:
@@ -87,7 +87,7 @@ def kill_one(path: Path, tick: float, after: float) -> float | None:
     try:
         recovery = recover(path, output)
     except RecordingError:
-        if killed - begun > ALLOWED_LOSS * 1e9:
+        if killed - begin > ALLOWED_LOSS * 1e9:
             raise
         return None
     assert not recovery.complete
@@ -150,7 +150,7 @@ def check_no_gaps(messages: dict[Key, bytes]) -> None:
 
 @dataclass(repr=False)
 class Original:
-    """A whole recording and what is in it.
+    """A complete recording and what is in it.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ def make_original(folder: Path, seconds: float = 6.0) -> Original:
     """Record a short flight."""
     path = folder / "original.mcap"
     assert record(path, 0.01, round(seconds * 100)).close()
-    places = []
+    spans = []
     with Source(path) as source:
         summary = read_summary(source)
         assert summary is not None
@@ -181,9 +181,9 @@ def make_original(folder: Path, seconds: float = 6.0) -> Original:
         scan(source, lambda content: contents.append({message[:2] for message in content.messages}))
         for start in starts:
             length = struct.unpack("<Q", source.at(start + 1, 8))[0]
-            places.append((start, start + 9 + length))
+            spans.append((start, start + 9 + length))
     log = read(path)
-    chunks = dict(zip(places, contents, strict=True))
+    chunks = dict(zip(spans, contents, strict=True))
     return Original(path.read_bytes(), messages_of(path), chunks, log.metadata, log.attachments)
 
 
@@ -192,46 +192,46 @@ Damage = tuple[bytes, int, int, int]  # damaged file, first and last + 1 byte of
 
 def cut(data: bytes, chance: random.Random) -> Damage:
     """The end is missing."""
-    place = chance.randrange(len(data))
-    return data[:place], place, len(data), 0
+    offset = chance.randrange(len(data))
+    return data[:offset], offset, len(data), 0
 
 
 def flip(data: bytes, chance: random.Random) -> Damage:
     """One bit is wrong."""
-    place = chance.randrange(len(data))
-    return data[:place] + bytes([data[place] ^ 1 << chance.randrange(8)]) + data[place + 1 :], place, place + 1, 0
+    offset = chance.randrange(len(data))
+    return data[:offset] + bytes([data[offset] ^ 1 << chance.randrange(8)]) + data[offset + 1 :], offset, offset + 1, 0
 
 
 def flip_early(data: bytes, chance: random.Random) -> Damage:
     """One byte is wrong where the definitions, the metadata and the attachments are."""
-    place = chance.randrange(4000)
-    return data[:place] + bytes([data[place] ^ chance.randrange(1, 256)]) + data[place + 1 :], place, place + 1, 0
+    offset = chance.randrange(4000)
+    return data[:offset] + bytes([data[offset] ^ chance.randrange(1, 256)]) + data[offset + 1 :], offset, offset + 1, 0
 
 
 def overwrite(data: bytes, chance: random.Random) -> Damage:
     """A block of noise."""
-    place, length = chance.randrange(len(data)), chance.randrange(1, 5000)
-    end = min(len(data), place + length)
-    return data[:place] + chance.randbytes(end - place) + data[end:], place, end, 0
+    offset, length = chance.randrange(len(data)), chance.randrange(1, 5000)
+    end = min(len(data), offset + length)
+    return data[:offset] + chance.randbytes(end - offset) + data[end:], offset, end, 0
 
 
 def zero(data: bytes, chance: random.Random) -> Damage:
     """A page of zeros, as file systems leave it."""
-    place = chance.randrange(len(data)) // 4096 * 4096
-    end = min(len(data), place + 4096)
-    return data[:place] + bytes(end - place) + data[end:], place, end, 0
+    offset = chance.randrange(len(data)) // 4096 * 4096
+    end = min(len(data), offset + 4096)
+    return data[:offset] + bytes(end - offset) + data[end:], offset, end, 0
 
 
 def insert(data: bytes, chance: random.Random) -> Damage:
     """Noise in between."""
-    place, length = chance.randrange(len(data)), chance.randrange(1, 300)
-    return data[:place] + chance.randbytes(length) + data[place:], place, place, length
+    offset, length = chance.randrange(len(data)), chance.randrange(1, 300)
+    return data[:offset] + chance.randbytes(length) + data[offset:], offset, offset, length
 
 
 def remove(data: bytes, chance: random.Random) -> Damage:
     """Bytes are missing in between."""
-    place, length = chance.randrange(len(data) - 300), chance.randrange(1, 300)
-    return data[:place] + data[place + length :], place, place + length, -length
+    offset, length = chance.randrange(len(data) - 300), chance.randrange(1, 300)
+    return data[:offset] + data[offset + length :], offset, offset + length, -length
 
 
 KINDS: tuple[Callable[[bytes, random.Random], Damage], ...] = (cut, flip, flip_early, overwrite, zero, insert, remove)

@@ -236,7 +236,7 @@ def stamps() -> tuple[str, bool]:
             for _ in range(60):
                 send(now() - round(age * 1e9))
             heard = made.hears("control_mixer", text, 3.0, before)
-            said.append(f"{name}: taken, {'told' if heard else 'NOT told'}")
+            said.append(f"{name}: taken, {'reported' if heard else 'NOT reported'}")
             good = good and heard
             client.spin(1.0)  # a clock of its own again
         before = _rejected(made)
@@ -288,7 +288,9 @@ def two_controllers() -> tuple[str, bool]:
         heard = made.hears(
             "control_mixer", "2 publishers of controls, the newest command counts: /copilot, /hover_hold"
         )
-        return ("told with their names" if heard else "NOT told") + "; the flight goes on", heard and made.flies()
+        return (
+            "reported with their names" if heard else "NOT reported"
+        ) + "; the flight goes on", heard and made.flies()
 
 
 CLOCK = """
@@ -433,7 +435,9 @@ def starved(share: float = 0.2) -> tuple[str, bool]:
         after = made.watch(6.0)[-1]
         ended = made.parts["simulator"].interrupt()
         log = replayed(made.parts["simulator"].record, "--verify")
-        text = f"real-time factor {pace:.2f} told, {missed} deadlines missed, {after.real_time_factor:.2f} afterwards;"
+        text = (
+            f"real-time factor {pace:.2f} reported, {missed} deadlines missed, {after.real_time_factor:.2f} afterwards;"
+        )
         text += f" log {log}"
         return text, ended == 0 and pace < 0.95 and missed > 0 and after.real_time_factor > PACE and log.startswith(
             "identical"

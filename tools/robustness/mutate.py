@@ -7,7 +7,7 @@ A mutant is a copy of the package with one change that cosmic-ray makes: another
 `and` and `or`; a number one more or less; a sign lost, a condition turned round; a loop that does not run. Of all that
 are possible in a module a sample is drawn, the same for the same seed; `--mutants 0` takes them all. The tests of the
 module (MODULES below) run on each, up to the first that fails: the mutant is killed. Those that no test fails at are
-printed; each either changes nothing that can be told, or marks what these tests do not see.
+printed; each either changes nothing that can be observed, or marks what these tests do not see.
 
 Kernels run as plain Python here (NUMBA_DISABLE_JIT): what is executed is what was changed, and the tests are those that
 are quick that way. Analyses run on the compiled model, which no mutant changes. cosmic-ray is not among the

@@ -4,7 +4,7 @@
 
 Each flight is one of the real flight loop, publisher and recorder: it is stepped and let go as fast as it can be
 published, commanded, reset (in the air, just above the ground, into states that cannot last, where it is), given winds,
-paused, and its log is begun and ended, all in any order, many between the same two ticks, after faults and ground
+paused, and its log is started and ended, all in any order, many between the same two ticks, after faults and ground
 contacts too. Every log must be whole, have one start, no state twice but where there was a reset, and come again bit
 for bit. What happened is counted; the exit code is 1 if something is wrong, and the number of the flight is printed:
 `--first NUMBER --flights 1` flies it alone, though a flight that is let go does not do the same each time.
@@ -166,7 +166,7 @@ class Flight:
         request = Record.Request(record=wanted, path=str(self._path()) if wanted else "")
         answer = self._log._on_record(request, Record.Response())
         assert answer.success, answer.message
-        self._counts["logs begun in flight"] += wanted
+        self._counts["logs started in flight"] += wanted
 
     # ---------------------------------------------------------------------------------------------------- and in what
 
@@ -226,7 +226,7 @@ def main(arguments: list[str] | None = None) -> int:
     rclpy.init(domain_id=options.domain, signal_handler_options=SignalHandlerOptions.NO)
     counts: collections.Counter[str] = collections.Counter()
     wrong, begin = 0, time.monotonic()
-    with progress_bar("flight") as progress, contextlib.suppress(KeyboardInterrupt):  # what has been flown is told
+    with progress_bar("flight") as progress, contextlib.suppress(KeyboardInterrupt):  # what has been flown is printed
         for number in range(options.first, options.first + options.flights):
             with tempfile.TemporaryDirectory() as name:
                 folder = Path(name)

@@ -99,7 +99,7 @@ def fly(made: World, hours: float, log: Path) -> tuple[list[str], bool, np.ndarr
     status = client.next("status")
     flat, text = is_flat(rows)
     ended = simulator.interrupt()
-    words = [f"{flown / 3600:.3f} h flown in {seconds:.0f} s, {farthest:.1f} m from the place at most", text]
+    words = [f"{flown / 3600:.3f} h flown in {seconds:.0f} s, {farthest:.1f} m from the target at most", text]
     words += [f"{status.log_dropped} messages not recorded, {status.dropped_messages} ticks not published", fault]
     good = flat and ended == 0 and not fault and farthest < 20.0
     return [word for word in words if word], good and status.log_dropped == status.dropped_messages == 0, rows
@@ -108,7 +108,7 @@ def fly(made: World, hours: float, log: Path) -> tuple[list[str], bool, np.ndarr
 def _hold(made: World, seconds: float) -> tuple[float, float, str]:
     """Hold hover step by step, every command in force before the next, so that no load on the machine comes between.
 
-    Returns the time flown [s], the largest distance from the place along an axis [m], and why it ended early.
+    Returns the time flown [s], the largest distance from the target along an axis [m], and why it ended early.
     """
     client, law = made.client, HoverLaw(Aircraft.load("sbs"))
     steps = client.node.create_client(Step, "step")
@@ -116,7 +116,7 @@ def _hold(made: World, seconds: float) -> tuple[float, float, str]:
     states, plates = client.messages["state"], client.watch("swashplate", SwashplateArray)
     request, time_now, farthest = Step.Request(ticks=1), 0.0, 0.0
     first: float | None = None
-    with contextlib.suppress(KeyboardInterrupt):  # what has been flown by then is told
+    with contextlib.suppress(KeyboardInterrupt):  # what has been flown by then is printed
         while first is None or time_now - first < seconds:
             state = states[-1]
             del states[:-1]
@@ -176,7 +176,7 @@ class Caller(threading.Thread):
     def __init__(self, domain: int, seed: int, end: float) -> None:
         super().__init__()
         self._client, self._chance, self._end = Client(domain, f"caller_{seed}"), random.Random(seed), end
-        self.calls, self.missed, self.slowest, self.told = 0, 0, 0.0, ""
+        self.calls, self.missed, self.slowest, self.reported = 0, 0, 0.0, ""
 
     def run(self) -> None:
         """Call."""
@@ -194,10 +194,10 @@ class Caller(threading.Thread):
             self.slowest = max(self.slowest, time.monotonic() - begin)
             if not answer.done():
                 self.missed += 1
-                self.told = f"{name} {fields}"
+                self.reported = f"{name} {fields}"
             elif "internal error" in answer.result().message:
                 self.missed += 1
-                self.told = answer.result().message
+                self.reported = answer.result().message
         self._client.close()
 
 
@@ -220,7 +220,7 @@ def call(made: World, minutes: float, log: Path) -> tuple[list[str], bool, np.nd
     calls, missed = sum(caller.calls for caller in callers), sum(caller.missed for caller in callers)
     slowest = max(caller.slowest for caller in callers)
     words = [f"{calls} requests of {CLIENTS} clients, {missed} without an answer, slowest {slowest:.2f} s", text]
-    words += [caller.told for caller in callers if caller.told][:3]
+    words += [caller.reported for caller in callers if caller.reported][:3]
     return words, flat and missed == 0 and ended == 0, rows
 
 

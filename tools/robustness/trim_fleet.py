@@ -59,7 +59,7 @@ ORDINARY, BEYOND, STALL, NONE, MISSED, WRONG = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a flight: number of the aircraft, names, one of the words above, what else is to be told."""
+    """What became of a flight: number of the aircraft, names, one of the words above, what else is to be said."""
 
     number: int
     kind: str
@@ -96,7 +96,7 @@ def solve(job: tuple[bool, int, int, int, float]) -> list[Outcome]:
 def _after_failure(other: "Other", error: str) -> tuple[str, str]:
     """What the other search has to say where `trim` finds nothing."""
     found = other.search()
-    return (NONE, error) if found is None else (MISSED, f"{other.told(found)}; trim: {error}")
+    return (NONE, error) if found is None else (MISSED, f"{other.described(found)}; trim: {error}")
 
 
 def _after_success(other: "Other", aircraft: Aircraft, point: TrimPoint, probe: bool) -> tuple[str, str, bool | None]:
@@ -109,7 +109,7 @@ def _after_success(other: "Other", aircraft: Aircraft, point: TrimPoint, probe: 
         return word, "", other.search() is not None if probe else None
     found = other.search()
     if found is not None and other.word(found) == ORDINARY:
-        return MISSED, f"{other.told(found)}; trim: {word}", None
+        return MISSED, f"{other.described(found)}; trim: {word}", None
     return word, "", None
 
 
@@ -201,13 +201,13 @@ class Other:
             return STALL
         return BEYOND if self._problem.beyond_limits(unknowns) else ORDINARY
 
-    def told(self, unknowns: np.ndarray) -> str:
+    def described(self, unknowns: np.ndarray) -> str:
         """A solution in words."""
         angles = np.degrees(unknowns[:6]).round(2).tolist()
         return f"{self.word(unknowns)}, pitch, roll and controls {angles} deg"
 
 
-# --- what is told ---------------------------------------------------------------------------------------------------
+# --- what is printed ------------------------------------------------------------------------------------------------
 
 
 def main() -> int:

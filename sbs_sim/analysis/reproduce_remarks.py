@@ -1,7 +1,7 @@
 """Why the recomputed results differ from the printed ones (theory.md section 9).
 
 A remark begins with the kind of reason: "reading" (comes out under the paper's assumptions only), "artefact" (of the
-way in which the paper computed or printed it; no sound model has it), "convention", "choice" (the paper leaves it
+way in which the paper computed or printed it; no physical model has it), "convention", "choice" (the paper leaves it
 open), "misprint", "unexplained". The numbers in them are those of `sbs` and `sbs_paper`.
 """
 
@@ -122,7 +122,7 @@ def general_remarks(facts: Mapping[str, Any], flights: Mapping[str, Mapping[str,
         "Sections without a name are those of docs/theory.md.",
         "Complete: rigid body and blades as one multibody system, poles of its full matrix. The paper's reading: blades"
         " on a steady hub, flap inertia m_b R^2 / 3 and the paper's hub moment, found by trial; it is not the only one"
-        " possible and not a sound model. Its body poles are those of the quasi-static 8-state matrix.",
+        " possible and not a physical model. Its body poles are those of the quasi-static 8-state matrix.",
         "Ratios are ours over print, with the sign for real numbers and of magnitudes where one of the two is a pair;"
         " a star marks what is more than 20 % off, of another kind (a pair for a real pole), or missing.",
         "Convention: the paper prints no sign with its damping, which is positive for the oscillations that grow: it is"

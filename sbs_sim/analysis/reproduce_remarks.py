@@ -122,7 +122,7 @@ def general_remarks(facts: Mapping[str, Any], flights: Mapping[str, Mapping[str,
         "Sections without a name are those of docs/theory.md.",
         "Complete: rigid body and blades as one multibody system, poles of its full matrix. The paper's reading: blades"
         " on a steady hub, flap inertia m_b R^2 / 3 and the paper's hub moment, found by trial; it is not the only one"
-        " possible and not a physical model. Its body poles are those of the quasi-static 8-state matrix.",
+        " possible and not physically consistent. Its body poles are those of the quasi-static 8-state matrix.",
         "Ratios are ours over print, with the sign for real numbers and of magnitudes where one of the two is a pair;"
         " a star marks what is more than 20 % off, of another kind (a pair for a real pole), or missing.",
         "Convention: the paper prints no sign with its damping, which is positive for the oscillations that grow: it is"

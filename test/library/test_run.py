@@ -8,6 +8,7 @@ import stat
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -126,7 +127,8 @@ def test_unknown_executable_is_reported_without_building(clone, name, meant):
 
 
 def test_version_and_completion_need_nothing(clone):
-    assert clone.call("--version").stdout == "sbs_sim 0.2.0\n"
+    version = ElementTree.parse(clone.folder / "package.xml").findtext("version")
+    assert clone.call("--version").stdout == f"sbs_sim {version}\n"
     printed = clone.call("completion").stdout
     path = shlex.split(printed)
     assert path == ["source", str(clone.folder / "config" / "completion.bash")]  # a folder with a blank in its name

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import solve_trim, trim
-from sbs_sim.concurrency.parallel import checked_workers, compute
+from sbs_sim.concurrency.parallel import Execution, compute
 from sbs_sim.content import ByContent
 from sbs_sim.errors import BatchError, SbsError
 from sbs_sim.flight.controls import Commands
@@ -216,12 +216,9 @@ def simulate_batch(
         cases,
         duration,
         fidelity,
+        Execution(workers, progress, cancelled, dask),
         every=every,
         outputs=outputs,
-        workers=workers,
-        progress=progress,
-        cancelled=cancelled,
-        dask=dask,
         memory=memory,
         **options,
     )
@@ -231,19 +228,17 @@ def simulate_cases(
     cases: Sequence[Case],
     duration: float,
     fidelity: Fidelity,
+    execution: Execution | None = None,
     *,
     every: int = 1,
     outputs: Sequence[str] = GROUPS,
-    workers: int | None = None,
-    progress: Callable[[int, int, int], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-    dask: str | distributed.Client | None = None,
     memory: float = MEMORY,
     **options: Any,
 ) -> Batch:
     """Fly many flights at once; see `simulate_batch`."""
     plan = _plan(cases, duration, fidelity, every, outputs, options)
-    count = checked_workers(workers, dask, BatchError)
+    execution = execution or Execution()
+    threads, progress = execution.threads(BatchError), execution.progress
     rows = round(plan.duration / plan.options["tick"]) // plan.every + 1
     names = tuple(dict.fromkeys(name for case in cases for name in case.aircraft.layout.names))
     memory = checks.number("memory", memory, 0.0, 1e15, "bytes", BatchError)
@@ -258,14 +253,14 @@ def simulate_cases(
         if progress is not None:
             progress(i, next(done), len(cases))
 
-    groups = _groups(cases, count or 1)
+    groups = _groups(cases, threads)
     calls = [(cases[group[0]].aircraft, [_flight(cases[i]) for i in group], plan) for group in groups]
 
     def keep_all(number: int, results: list[Result]) -> None:
         for i, result in zip(groups[number], results, strict=True):
             keep(i, result)
 
-    compute(_fly, calls, keep_all, workers=count, cancelled=cancelled, dask=dask)
+    compute(_fly, calls, keep_all, execution, threads)
     time = np.multiply(np.arange(rows) * plan.every, plan.options["tick"], dtype=float)
     return Batch(tuple(cases), time, names, histories, tuple(errors), tuple(warnings))
 

@@ -23,7 +23,7 @@ from sbs_sim.analysis.linear_model import LinearModel
 from sbs_sim.analysis.linearize import linearize_trim
 from sbs_sim.analysis.modes import Mode
 from sbs_sim.analysis.trim import Guess, checked_guess, solve_trim
-from sbs_sim.concurrency.parallel import checked_workers, compute
+from sbs_sim.concurrency.parallel import Execution, compute
 from sbs_sim.errors import AircraftError, SbsError, SweepError
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.model import state as S
@@ -280,12 +280,9 @@ def sweep(
         values,
         TrimCondition(**given),
         Fidelity(lead_lag, cyclic_inflow, azimuth_count),
+        Execution(workers, progress, cancelled, dask),
         guess=guess,
         linear=linear,
-        workers=workers,
-        progress=progress,
-        cancelled=cancelled,
-        dask=dask,
     )
 
 
@@ -295,13 +292,10 @@ def sweep_flights(
     values: ArrayLike,
     condition: TrimCondition,
     fidelity: Fidelity,
+    execution: Execution | None = None,
     *,
     guess: Guess | None = None,
     linear: bool = True,
-    workers: int | None = None,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
-    dask: str | distributed.Client | None = None,
 ) -> Sweep:
     """Trim, and linearize, along one parameter; see `sweep`. The condition is zero in what is swept."""
     checks.instance("aircraft", aircraft, Aircraft, SweepError)
@@ -313,7 +307,8 @@ def sweep_flights(
     if parameter in CONDITIONS and getattr(condition, parameter) != 0.0:
         value = checks.shown(getattr(condition, parameter))
         raise SweepError(f"{parameter} = {value}: not allowed where {parameter} is swept")
-    count = checked_workers(workers, dask, SweepError)
+    execution = execution or Execution()
+    threads, progress = execution.threads(SweepError), execution.progress
     points = [SweepPoint(value, None, None, CANCELLED) for value in numbers]
     done = itertools.count(1)
 
@@ -323,7 +318,7 @@ def sweep_flights(
             progress(point, next(done), len(points))
 
     calls = [(aircraft, parameter, value, condition, fidelity, guess, linear) for value in numbers]
-    compute(_solve, calls, keep, workers=count, cancelled=cancelled, dask=dask)
+    compute(_solve, calls, keep, execution, threads)
     controls = dict(zip(aircraft.control_names, aircraft.control_units, strict=True))
     return Sweep(parameter, tuple(points), controls)
 

@@ -10,6 +10,7 @@ from sbs_sim.commands.common import (
     add_worker_arguments,
     aircraft,
     execute,
+    execution,
     fixed,
     flight,
     print_table,
@@ -96,11 +97,9 @@ def _work(arguments: argparse.Namespace) -> None:
             cases,
             arguments.duration,
             fidelity,
+            execution(arguments, progress),
             every=round(100 * arguments.every),
             outputs=OUTPUTS,
-            workers=arguments.workers,
-            dask=arguments.dask,
-            progress=progress,
         )
     _print_batch(batch)
     if arguments.csv:

@@ -18,6 +18,7 @@ from sbs_sim.terminal.command_line import Parser, assignment
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
+    from sbs_sim.concurrency.parallel import Execution
     from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 
 DEGREES = 180.0 / math.pi
@@ -138,6 +139,13 @@ def add_worker_arguments(group: "argparse._ArgumentGroup") -> None:
         metavar="ADDRESS",
         help="compute on a dask cluster with the scheduler at tcp://HOST:PORT; the results are the same",
     )
+
+
+def execution(arguments: argparse.Namespace, progress: "Callable[..., None] | None") -> "Execution":
+    """Who makes the calls, with the progress that is shown."""
+    from sbs_sim.concurrency.parallel import Execution
+
+    return Execution(arguments.workers, progress, dask=arguments.dask)
 
 
 def aircraft(arguments: argparse.Namespace) -> "Aircraft":

@@ -12,6 +12,7 @@ from sbs_sim.commands.common import (
     add_worker_arguments,
     aircraft,
     execute,
+    execution,
     fixed,
     flight,
     guess,
@@ -95,11 +96,9 @@ def _work(arguments: argparse.Namespace) -> None:
             parameter,
             values,
             *flight(arguments),
+            execution(arguments, progress),
             guess=guess(arguments, craft),
             linear=arguments.linear,
-            workers=arguments.workers,
-            dask=arguments.dask,
-            progress=progress,
         )
     _print_sweep(found)
     if arguments.csv:

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol
@@ -20,6 +21,45 @@ if TYPE_CHECKING:
 
 MAX_WORKERS = 256
 POLL_PERIOD = 0.05  # s between looks whether the caller wants to go on
+
+
+@dataclass(frozen=True)
+class Execution:
+    """Who makes many calls, who hears of their progress, and who may end them.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Number of threads, one for each core if not given. Not with a cluster.
+    progress : callable, optional
+        Called in the calling thread as each call ends; the last two arguments are the numbers of calls done and of all.
+    cancelled : callable, optional
+        Asked several times a second; after a True no further call is started.
+    dask : str or distributed.Client, optional
+        Address of the scheduler of a cluster, which then takes the calls in place of threads. Calls of a worker that
+        is lost are made again.
+    """
+
+    workers: int | None = None
+    progress: Callable[..., None] | None = None
+    cancelled: Callable[[], bool] | None = None
+    dask: "str | distributed.Client | None" = None
+
+    def threads(self, error: type[SbsError]) -> int:
+        """Number of threads.
+
+        Raises
+        ------
+        error
+            `workers` is no integer in the range, or there is a cluster.
+        """
+        workers = self.workers
+        if workers is None:
+            return len(os.sched_getaffinity(0))
+        if self.dask is not None:
+            shown = checks.shown(workers)
+            raise error(f"workers = {shown}: not allowed with dask, whose workers are those of the cluster")
+        return checks.integer("workers", workers, 1, MAX_WORKERS, error)
 
 
 class Pool(Protocol):
@@ -39,10 +79,8 @@ def compute(
     function: Callable[..., Any],
     calls: Sequence[tuple[Any, ...]],
     keep: Callable[[int, Any], None],
-    *,
-    workers: int,
-    cancelled: Callable[[], bool] | None = None,
-    dask: "str | distributed.Client | None" = None,
+    execution: Execution,
+    threads: int,
 ) -> None:
     """Call a function with each of many arguments, in any order; an interruption (Ctrl-C) ends all of them soon.
 
@@ -54,20 +92,17 @@ def compute(
         Arguments of each call, an `Aircraft` the first.
     keep : callable
         Called with the number of a call and its result, in the calling thread, as each ends.
-    workers : int
-        Number of threads.
-    cancelled : callable, optional
-        Asked several times a second; after a True no further call is started.
-    dask : str or distributed.Client, optional
-        Address of the scheduler of a cluster, which then takes the calls in place of threads. Calls of a worker that
-        is lost are made again.
+    execution : Execution
+    threads : int
+        `Execution.threads`, checked by the caller before it made the calls.
 
     Raises
     ------
     ClusterError
         The cluster cannot be reached, or does not give what this process would.
     """
-    with _pool(workers, dask) as pool:
+    cancelled = execution.cancelled
+    with _pool(threads, execution.dask) as pool:
         ended: SimpleQueue[int] = SimpleQueue()
         waiting = {i: pool.submit(function, *call) for i, call in enumerate(calls)}
         for i, future in waiting.items():
@@ -101,21 +136,6 @@ def _as_they_end(ended: "SimpleQueue[int]", count: int) -> Iterator[Any]:
             yield None
         else:
             count -= 1
-
-
-def checked_workers(workers: int | None, dask: object, error: type[SbsError]) -> int:
-    """Number of threads, one for each core if None.
-
-    Raises
-    ------
-    error
-        It is no integer in the range, or there is a cluster.
-    """
-    if workers is None:
-        return len(os.sched_getaffinity(0))
-    if dask is not None:
-        raise error(f"workers = {checks.shown(workers)}: not allowed with dask, whose workers are those of the cluster")
-    return checks.integer("workers", workers, 1, MAX_WORKERS, error)
 
 
 def _pool(workers: int, dask: "str | distributed.Client | None") -> AbstractContextManager[Pool]:

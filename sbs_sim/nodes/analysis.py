@@ -22,6 +22,7 @@ from sbs_sim.analysis.linear_model import growing_rotor_modes_text
 from sbs_sim.analysis.linearize import linearize, linearize_trim
 from sbs_sim.analysis.sweep import SweepPoint, sweep_flights
 from sbs_sim.analysis.trim import solve_trim
+from sbs_sim.concurrency.parallel import Execution
 from sbs_sim.errors import SbsError
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition
 from sbs_sim.flight_loop import FlightLoop
@@ -141,10 +142,12 @@ class Analysis(Component):
             request.parameter,
             request.values.tolist(),
             *_flight(request),
+            Execution(
+                self._sweep_workers,
+                progress=tell,
+                cancelled=lambda: goal.is_cancel_requested or self._ending.is_set(),
+            ),
             linear=request.linear,
-            workers=self._sweep_workers,
-            progress=tell,
-            cancelled=lambda: goal.is_cancel_requested or self._ending.is_set(),
         )
         return sweep_messages(self._aircraft, swept)
 

@@ -14,7 +14,7 @@ from sbs_sim import simulate_batch
 from sbs_sim.analysis.batch import Case
 from sbs_sim.concurrency import interruption
 from sbs_sim.concurrency.interruption import InterruptedCallError
-from sbs_sim.concurrency.parallel import compute
+from sbs_sim.concurrency.parallel import Execution, compute
 
 PATIENCE = 60.0  # s, generous, for machines that are busy
 CODE = """
@@ -109,7 +109,7 @@ def test_calls_at_work_end_where_they_look_and_those_that_wait_do_not_begin(sbs)
         return False
 
     with pytest.raises(KeyboardInterrupt):
-        compute(work, [(sbs, i) for i in range(5)], lambda *_: None, workers=2, cancelled=asked)
+        compute(work, [(sbs, i) for i in range(5)], lambda *_: None, Execution(cancelled=asked), 2)
     assert sorted(started) == sorted(ended) == [0, 1]
 
 

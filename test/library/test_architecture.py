@@ -64,7 +64,7 @@ def own_imports(name):
 
 
 def within(item, allowed):
-    return any(item == place or item.startswith(f"{place}.") for place in allowed)
+    return any(item == layer or item.startswith(f"{layer}.") for layer in allowed)
 
 
 def run_time_imports(name):
@@ -175,19 +175,19 @@ FORBIDDEN = {
 }
 
 
-@pytest.mark.parametrize("place", ALLOWED)
-def test_the_lower_layers_import_nothing_from_above(place):
-    members = [name for name in MODULES if within(name, [place])]
+@pytest.mark.parametrize("layer", ALLOWED)
+def test_the_lower_layers_import_nothing_from_above(layer):
+    members = [name for name in MODULES if within(name, [layer])]
     assert members
     for name in members:
-        beyond = [item for item in own_imports(name) if not within(item, ALLOWED[place])]
+        beyond = [item for item in own_imports(name) if not within(item, ALLOWED[layer])]
         assert beyond == [], f"{name} imports {beyond}"
 
 
 @pytest.mark.parametrize("name", LIBRARY)
 def test_imports_run_one_way(name):
-    for place, above in FORBIDDEN.items():
-        if within(name, [place]):
+    for layer, above in FORBIDDEN.items():
+        if within(name, [layer]):
             assert [item for item in own_imports(name) if within(item, above)] == []
 
 

@@ -260,7 +260,7 @@ def parameters() -> str:
 ALL, SUPPRESSED = ("help", "version"), argparse.SUPPRESS
 COMMANDS_TEXT = """
 `./run NAME` is the same as `ros2 run sbs_sim NAME`. Errors are one line and exit code 1, a wrong command line is 2,
-Ctrl-C 130 where there is something to be cut short. Each has `--version`, and `--help`, which of nodes tells topics,
+Ctrl-C 130 where there is something to be cut short. Each has `--version`, and `--help`, which of nodes lists topics,
 services and parameters. Executables without a command line of their own take ROS arguments: their parameters are in
 [Parameters](parameters.md). Outside of ROS the package brings one command for all of them, `sbs-sim NAME`.
 

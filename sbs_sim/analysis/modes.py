@@ -376,10 +376,10 @@ def _alike_rotors(speeds: Mapping[int, float], states: _States) -> list[tuple[in
 
 
 def _speed(a: Array, states: _States, rotor: int) -> float:
-    """Speed of a rotor [rad/s], not a number where the states do not tell.
+    """Speed of a rotor [rad/s], not a number where the states do not show it.
 
     The turning of the multiblade coordinates couples the rates of the two of the nth harmonic by -2 n Omega and
-    2 n Omega (theory.md eq. 1.8). The product of both elements does not depend on units. Flap tells it to 1e-5, lag,
+    2 n Omega (theory.md eq. 1.8). The product of both elements does not depend on units. Flap gives it to 1e-5, lag,
     whose inertia the hub adds to, to some per cent.
     """
     for cosine, sine in states.turning[rotor]:

@@ -41,7 +41,7 @@ STYLE: dict[Any, Any] = {
     "hatch.linewidth": 0.6,
     "axes.unicode_minus": True,
 }
-FORMATS = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}  # and what they do not tell
+FORMATS = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}  # and metadata that are left out
 DOTS_PER_INCH = 160
 WIDE, HALF = 7.0, 3.45  # inches
 MIN_ANGLE = 2.0  # deg that an axis covers

@@ -75,7 +75,7 @@ def find(problem: TrimProblem, condition: TrimCondition, guess: Array | None = N
     Raises
     ------
     TrimError
-        No trim; the message tells what stops it.
+        No trim; the message says what stops it.
     """
     search = _Search(problem, condition)
     return search.run(guess), search.iterations

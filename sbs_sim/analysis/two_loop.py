@@ -62,7 +62,7 @@ def solve_by_two_loops(problem: TrimProblem, condition: TrimCondition, start: Ar
 
 
 class _TwoLoops:
-    """The loops on their way: the unknowns, and what to tell about them if they fail.
+    """State of the loops: the unknowns, and what an error says about them.
 
     Equations and unknowns of the problem have the same order: accelerations of the body and attitude with controls,
     accelerations of the multiblade coordinates and these, inflow rates and inflow. So each block is solved for the

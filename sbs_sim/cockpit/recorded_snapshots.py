@@ -31,7 +31,7 @@ class RecordedSnapshots:
     times : ndarray, shape (n,)
         Of the recorded states [s].
     ground : float or None
-        Height of the ground above the origin [m]; None if the log does not tell.
+        Height of the ground above the origin [m]; None if the log does not have it.
     complete : bool
         False if the file is incomplete; the states then are those that it has.
 

@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Executable `sbs-sim`."""
     name, *rest = [*(sys.argv[1:] if arguments is None else arguments), ""]
     if name in ("-h", "--help", "help"):
-        print(f"{USAGE}\n{_listed()}\n\n`sbs-sim NAME --help` tells the rest.")
+        print(f"{USAGE}\n{_listed()}\n\n`sbs-sim NAME --help` has the rest.")
         return 0
     if name == "--version":
         print(command_line.version_line())

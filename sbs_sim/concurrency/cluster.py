@@ -1,4 +1,4 @@
-"""A dask cluster as a place for calls: aircraft travel as data, and workers that would give other bits are refused."""
+"""Calls on a dask cluster: aircraft travel as data, and workers that would give other bits are refused."""
 
 import functools
 import importlib.metadata

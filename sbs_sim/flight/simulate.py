@@ -64,7 +64,7 @@ def simulate(
         [m/s^2], "thrust" [N], "torque" [N m], "power" [W] (n, n_rotors), "state" (n, size) and every name of the
         simulation state (n,), "phi", "theta", "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed
         relative to the air [m/s].
-        `warnings` tells where the model does not hold.
+        `warnings` says where the model does not hold.
 
     Raises
     ------

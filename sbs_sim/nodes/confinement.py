@@ -71,7 +71,7 @@ def alone_in_domain(domain: int) -> bool:
         return False
     own, ports = _own_sockets(), range(FIRST_PORT + PORTS * domain, FIRST_PORT + PORTS * (domain + 1))
     listening = [(port, inode) for _, port, inode in _listening() if port in ports]
-    # those of this process must be seen, or the kernel does not tell
+    # those of this process must be seen, or the kernel does not show it
     return bool(listening) and all(inode in own for _, inode in listening)
 
 

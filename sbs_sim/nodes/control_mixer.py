@@ -135,7 +135,7 @@ class ControlMixer(Component):
         return [names.index(name) for name in message.names]
 
     def _present(self) -> NDArray[np.float64]:
-        """All controls as they were commanded, or as the swashplates tell."""
+        """All controls as they were commanded, or as the swashplates show."""
         if self._values is not None:
             return self._values.copy()
         angles = self._loop.swashplate() if self._loop is not None else self._mixer.position

@@ -130,7 +130,7 @@ def log_path(record: str, aircraft: str, begin: datetime.datetime) -> Path:
 
 
 def ros_distro() -> str:
-    """Name of the distribution of ROS 2 that runs; empty where nothing tells it.
+    """Name of the distribution of ROS 2 that runs; empty where it is not known.
 
     An installed one says it in the environment. The wheels do not: there rclpy's version does (REP 2000).
     """

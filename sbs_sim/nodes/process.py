@@ -142,7 +142,7 @@ def own_arguments(args: list[str] | None) -> list[str]:
 def named_alone(args: Sequence[str], first: str) -> list[str]:
     """Command line in which a new name for every node of the process (`__node:=x`) is one for the first of them alone.
 
-    Else all of them would have it: no parameter service could tell them apart.
+    Else all of them would have it: no parameter service could distinguish them.
     """
     changed, of_ros, is_rule = [], False, False
     for arg in args:

@@ -59,7 +59,7 @@ class StickNode(PilotNode):
                 return None
             self._take_over(self._current_controls, body)
         if now < self.time:
-            self._first, self._first_event = None, time.monotonic()  # another flight, whose start tells the controls
+            self._first, self._first_event = None, time.monotonic()  # another flight, whose start has the controls
             return None
         self.pilot.sticks = self.sticks()
         return self.pilot.controls(now, body)

@@ -113,7 +113,7 @@ def message_definition(type_name: str, find_file: Callable[[str, str], Path]) ->
 
 
 def type_hash(type_name: str, find_file: Callable[[str, str], Path]) -> str:
-    """Hash by which ROS 2 tells types of one name apart (REP 2016), as the installed description of the type has it.
+    """Hash by which ROS 2 distinguishes types of one name (REP 2016), as the installed description of the type has it.
 
     Parameters
     ----------

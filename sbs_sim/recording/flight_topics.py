@@ -60,7 +60,7 @@ class FlightTopics:
 
     @property
     def title(self) -> str:
-        """What tells it from others: the topic of its states, and when it began."""
+        """What distinguishes it: the topic of its states, and when it began."""
         begin = self.recording_id.partition("-")[0]
         wall = f" started {wall_clock(int(begin))}" if begin.isdecimal() and int(begin) < MAX_WALL_TIME else ""
         return f"{self.roles[BODY][0]}{wall}"
@@ -96,7 +96,7 @@ def unclaimed(channels: Iterable[int], parts: Sequence[FlightTopics]) -> frozens
 
 
 def mixed(channels: Iterable[Channel], parts: Sequence[FlightTopics]) -> set[str]:
-    """Topics of some channels that several flights have in common, but for the one that tells the time."""
+    """Topics of some channels that several flights have in common, but for the one of the time."""
     owners: dict[str, set[int]] = {}
     for channel in channels:
         for number, part in enumerate(parts):

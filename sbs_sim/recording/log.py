@@ -164,7 +164,7 @@ class Log(Mapping[str, Topic]):
 
     @property
     def title(self) -> str:
-        """What tells the flight from others: aircraft, topic of its states, and when it began."""
+        """What distinguishes the flight: aircraft, topic of its states, and when it began."""
         aircraft = self.metadata.get("simulation", {}).get("aircraft", "")
         return " on ".join(filter(None, (aircraft, "" if self._part is None else self._part.title)))
 

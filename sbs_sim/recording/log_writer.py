@@ -104,7 +104,7 @@ class LogWriter:
         self._queue: list[Message] = []
         self._queued_bytes = 0
         self._in_hand = 0  # messages that the thread has taken out of the queue and not yet written
-        self._sequence: dict[int, int] = {}  # by channel; dropped messages count, so that a gap tells of them
+        self._sequence: dict[int, int] = {}  # by channel; dropped messages count, so that a gap shows them
         self._closing = False
         self._lock = threading.Lock()
         self._work = threading.Condition(self._lock)

@@ -1,8 +1,8 @@
 """The bytes of an MCAP file, piece by piece: what a writer and a recovery have in common.
 
 The records are those of the `mcap` package. Its `Writer` is not used: it puts schemas and channels into the first chunk
-only, so that one damaged chunk can take the whole file with it; it does not tell what reached the file when the disk is
-full; and its price per message is several times that of the few lines here.
+only, so that one damaged chunk can make the whole file unreadable; it does not report what reached the file when the
+disk is full; and its time per message is several times that of the few lines here.
 """
 
 import contextlib
@@ -299,7 +299,7 @@ class NewFile:
             raise RecordingError(f"{self.path} was overwritten by another program during the recording")
 
     def _present_path(self) -> Path:
-        """Where the file is now, if it is anywhere and the system tells (Linux)."""
+        """Where the file is now, if it is anywhere and the system reports it (Linux)."""
         with contextlib.suppress(OSError):
             path = Path(os.readlink(f"/proc/self/fd/{self._descriptor}"))
             # NFS keeps a deleted file under such a name, until it is closed

@@ -11,7 +11,7 @@ from sbs_sim.recording.mcap_file import reason
 from sbs_sim.recording.other_formats import describe_file, describe_folder
 
 BLOCK = 1 << 20
-HEAD_SIZE = 64  # bytes that tell what kind of file it is
+HEAD_SIZE = 64  # bytes that show what kind of file it is
 
 
 class DamageError(Exception):

@@ -54,7 +54,7 @@ def compiled_for(name: str, features: str = "", optimisation: str = "3") -> dict
 
 OWN = "own"  # beside the variables of a way: it is compiled anew
 FLAT = {"OPENBLAS_CORETYPE": "Sandybridge", "NPY_DISABLE_CPU_FEATURES": NO_AVX}
-# Libraries take other code where the target is another, so that one run tells more.
+# Libraries take other code where the target is another, so that one run shows more.
 WAYS: dict[str, dict[str, str]] = {
     "native": {OWN: ""},
     "haswell": {**compiled_for("haswell"), "OPENBLAS_CORETYPE": "Haswell"},

@@ -5,7 +5,7 @@
 Real processes over real DDS on loopback: the simulator with its recorder, the control mixer, the analysis and the hover
 hold as the controller, each on its own. They are killed one by one and in pairs, sent commands that are late,
 doubled, out of order or ten thousand a second, given a host whose clock jumps, readers that do not read, fifty
-neighbours, a full disk and a fifth of a processor. A line per fault tells what the others did and said; the exit code
+neighbours, a full disk and a fifth of a processor. A line per fault says what the others did and said; the exit code
 is 1 if one went wrong.
 """
 

@@ -7,7 +7,7 @@ Conventional, tandem, side-by-side, quadrotor and coaxial aircraft (test/support
 forward flight and one other; or, equipped, those of tools/robustness/generality.py with every key. What is found must
 fulfil the complete equations and fly on for a revolution. What is not found is looked for by another way: least squares
 from random attitudes, controls and inflows all over the ranges. The same search after every tenth flight that was found
-tells how much it sees. The exit code is 1 if it finds a flight without stalled rotors that `trim` does not, or if
+shows how much it sees. The exit code is 1 if it finds a flight without stalled rotors that `trim` does not, or if
 something found is no trim.
 """
 

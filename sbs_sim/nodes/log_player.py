@@ -6,6 +6,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from mcap.records import Channel
@@ -31,22 +32,39 @@ CONFLICT_CHECK_TIME = 10.0
 MIN_PASS_TIME = 0.05  # s of wall time for one pass of a loop, however short the log is
 
 
+@dataclass(frozen=True)
+class PlayOptions:
+    """How a log is played.
+
+    Parameters
+    ----------
+    rate : float
+        Recorded time over wall time.
+    start, end : float
+        Part of the log, from its first message on [s].
+    loop : bool
+        Start again at the end.
+    topics : sequence of str
+        Those to publish; all if empty.
+    delay : float
+        Maximum wait until every topic has a subscriber [s]; at least DISCOVERY_TIME.
+    """
+
+    rate: float
+    start: float
+    end: float
+    loop: bool
+    topics: Sequence[str]
+    delay: float
+
+
 class LogPlayer(Component):
     """Publishes a log.
 
     Parameters
     ----------
     playback : Playback
-    rate : float
-        Recorded time over wall time.
-    start, end : float
-        Part of the log, from its first message on [s].
-    loop : bool
-        Begin again at the end.
-    topics : sequence of str
-        Those to publish; all if empty.
-    delay : float
-        Maximum wait until every topic has a subscriber [s]; at least DISCOVERY_TIME.
+    options : PlayOptions
     ended : threading.Event
         Set at the end of the log.
     progress : callable, optional
@@ -61,24 +79,18 @@ class LogPlayer(Component):
     def __init__(
         self,
         playback: Playback,
-        rate: float,
-        start: float,
-        end: float,
-        loop: bool,
-        topics: Sequence[str],
-        delay: float,
+        options: PlayOptions,
         ended: threading.Event,
         progress: Progress | None = None,
     ) -> None:
         super().__init__("replay")
-        self._delay = delay
-        self._playback, self._rate, self._start, self._end, self._loop = playback, rate, start, end, loop
+        self._playback, self._options = playback, options
         self.failure = ""
         if playback.warning:
             self.get_logger().warning(playback.warning)
         self._left_out: dict[str, int] = {}  # messages that are none of their topic's type
         self._fits: dict[int, Fit] = {}
-        self._outputs = self._make_publishers(topics)
+        self._outputs = self._make_publishers(options.topics)
         self._wake = threading.Condition()
         self._paused = self._stopping = False
         self._ended, self._progress = ended, progress
@@ -132,7 +144,7 @@ class LogPlayer(Component):
     def _play(self) -> None:
         try:
             self._wait_for_discovery()
-            for _ in itertools.count() if self._loop else range(1):
+            for _ in itertools.count() if self._options.loop else range(1):
                 pass_start = time.monotonic()
                 if not self._play_once() or self._wait_until(pass_start + MIN_PASS_TIME) is None:
                     break
@@ -156,7 +168,7 @@ class LogPlayer(Component):
                 self._wake.wait(min(left, CHECK_PERIOD))
                 self._check_conflicts()
                 subscribed = all(output.get_subscription_count() for output in self._outputs.values())
-                timeout = DISCOVERY_TIME if subscribed else max(DISCOVERY_TIME, self._delay)
+                timeout = DISCOVERY_TIME if subscribed else max(DISCOVERY_TIME, self._options.delay)
         self._check_end = time.monotonic() + CONFLICT_CHECK_TIME
 
     def _check_conflicts(self) -> None:
@@ -174,13 +186,13 @@ class LogPlayer(Component):
         """Publish the log from start to end; false if stopped."""
         anchor: float | None = None
         begin = 0
-        length = min(self._end, self._playback.duration) - self._start
-        for log_time, channel, data in self._playback.messages(self._start, self._end):
+        length = min(self._options.end, self._playback.duration) - self._options.start
+        for log_time, channel, data in self._playback.messages(self._options.start, self._options.end):
             if channel not in self._outputs:
                 continue
             if anchor is None:
                 anchor, begin = time.monotonic(), log_time
-            held = self._wait_until(anchor + (log_time - begin) * 1e-9 / self._rate)
+            held = self._wait_until(anchor + (log_time - begin) * 1e-9 / self._options.rate)
             if held is None:
                 return False
             anchor += held

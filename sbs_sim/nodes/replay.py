@@ -14,7 +14,7 @@ from typing import Any
 
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.component import Component
-from sbs_sim.nodes.log_player import LogPlayer, Progress
+from sbs_sim.nodes.log_player import LogPlayer, PlayOptions, Progress
 from sbs_sim.nodes.process import DISCOVERY_TIME, own_arguments, run
 from sbs_sim.nodes.signals import (
     INTERRUPTED,
@@ -150,8 +150,8 @@ def _replay(options: argparse.Namespace) -> int:
     with Playback(options.file, options.flight) as playback, progress_bar("s") as progress:
 
         def make() -> list[Component]:
-            how = (options.rate, options.start, options.end, options.loop, options.topics, options.delay)
-            players.append(LogPlayer(playback, *how, ended, progress))
+            how = PlayOptions(**{name: getattr(options, name) for name in PLAYBACK_OPTIONS})
+            players.append(LogPlayer(playback, how, ended, progress))
             return list(players)
 
         code = run(make, sys.argv[:1], ended)

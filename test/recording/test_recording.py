@@ -357,7 +357,7 @@ def test_what_the_summary_names_is_before_it(tmp_path):
         log.write(first, 0, number_message(1))
         wait_until(lambda: log.written == 1)
         add_number(log, "/late")
-        log.add_channel("/strange", "test_msgs/msg/Strange", "int8 value", "", type_hash="RIHS01_00", role="other")
+        log.add_channel("/other", "test_msgs/msg/Other", "int8 value", "", type_hash="RIHS01_00", role="other")
     with path.open("rb") as file:
         records = list(StreamReader(file, validate_crcs=True).records)
     names = [type(record).__name__ for record in records]

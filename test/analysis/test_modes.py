@@ -549,7 +549,7 @@ def test_every_linear_state_is_known():
             assert inflow == [0, 1, 1]
 
 
-@pytest.mark.parametrize("name", ["x", "a0", "lambda0", "xi1(1)", "psi", ""])
+@pytest.mark.parametrize("name", ["s", "a0", "lambda0", "xi1(1)", "psi", ""])
 def test_unknown_states_are_refused(name):
     with pytest.raises(ValueError, match="no linear state is called"):
         modes(np.zeros((1, 1)), [name])

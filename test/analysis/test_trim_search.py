@@ -502,7 +502,7 @@ def test_what_no_weight_makes_possible_is_reported_by_momentum_theory(uh60a):
         ({"kind": "none"}, 0.0),
     ],
 )
-def test_a_drive_that_is_too_weak_is_told_with_what_the_rotors_take(sbs, engine, most):
+def test_a_drive_that_is_too_weak_is_reported_with_what_the_rotors_take(sbs, engine, most):
     """The torque at constant speed beside the largest of the drive; a strong one trims."""
     governor = {"integral_gain": 2.0, "proportional_gain": 2.0}
     data = aircraft_data() | {"drives": [{"rotors": ["R1", "R2"], "engine": engine, "governor": governor}]}

@@ -170,7 +170,8 @@ class Aircraft(Description):
             Paths and values as for `with_value`. Where two paths stand for one value the later one counts:
             {"rotors.radius": 0.4, "rotors.MR1.radius": 0.5}. An element of the inertia off the diagonal sets the
             symmetric one, too: "body.inertia[0][1]" is "body.inertia[1][0]". "environment.altitude" takes the place
-            of density, viscosity and speed of sound.
+            of density, viscosity and speed of sound, "rotors.mass_distribution" that of mass, c.g. and inertia of a
+            blade.
 
         Raises
         ------
@@ -179,13 +180,15 @@ class Aircraft(Description):
         """
         checks.instance("values", values, Mapping, AircraftError)
         plain = {path: _python(value) for path, value in values.items()}
-        data, pairs = self.data, dict[Location, tuple[str, Any]]()
+        data, pairs, given = self.data, dict[Location, tuple[str, Any]](), list[Location]()
         for path, value in plain.items():
             for location in locations(data, schema_of(type(self)), path):
                 for one in (location, mirrored(location)):
                     data = replaced(data, one, value)
-                data = without(data, instead_of(location), plain)
+                given.append(location)
                 _check_pair(pairs, location, path, value)
+        for location in dict.fromkeys(other for one in given for other in instead_of(one) if other not in given):
+            data = without(data, location)
         try:
             return self._made_of(data, self.folder, self)
         except AircraftError as error:

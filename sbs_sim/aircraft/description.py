@@ -435,7 +435,7 @@ class Rotor(ByContent):
     )
     speed: float = number("Rotor speed", 1, 100000, "rpm", symbol=r"\Omega", model_field="rotor_speed")
     radius: float = number("Rotor radius", 0.01, 50, "m", symbol="R", model_field="radius")
-    blades: int = integer("Number of blades", 3, MAX_BLADES, symbol="N_b")
+    blades: int = integer("Number of blades", 2, MAX_BLADES, symbol="N_b")
     blade_mass: float = number(
         "Mass of a blade; follows from `mass_distribution` where the file has that",
         MIN_BLADE_MASS,

@@ -71,6 +71,8 @@ def hold_coordinates(aircraft, memory):
     indices = aircraft.indices
     for r in range(aircraft.blades.shape[0]):
         blade, terms = aircraft.blades[r], memory.terms[r]
+        if blade.harmonics == 0:  # two blades move with their own accelerations
+            continue
         flap = steady_acceleration(memory.state, indices.flap, blade, terms)
         lag = steady_acceleration(memory.state, indices.lag, blade, terms)
         terms.flap_acceleration, terms.lag_acceleration = flap, lag * blade.lead_lag

@@ -618,8 +618,8 @@ REFUSED = {
         0.5,
         "rotors[1].root_cutout = 0.5: allowed is < 0.43, from the flap hinge to the tip",
     ),
-    "no blades": ((*R0, "blades"), 0, "rotors[0].blades = 0: allowed is >= 3"),
-    "two blades": ((*R0, "blades"), 2, "rotors[0].blades = 2: allowed is >= 3"),
+    "no blades": ((*R0, "blades"), 0, "rotors[0].blades = 0: allowed is >= 2"),
+    "one blade": ((*R0, "blades"), 1, "rotors[0].blades = 1: allowed is >= 2"),
     "three and a half blades": ((*R0, "blades"), 3.5, "rotors[0].blades = 3.5: allowed is an integer"),
     "blade whose mass is too far out": (
         (*R0, "blade_cg"),
@@ -783,8 +783,8 @@ def test_a_bad_value_is_refused_in_one_line(path, value, line):
 def test_all_that_is_wrong_is_said_once():
     data = sbs_data()
     del data["body"]["mass"], data["body"]["inertia"]
-    data["rotors"][1]["blades"] = 2
-    assert refusal(data) == "body.inertia, body.mass: missing key; rotors[1].blades = 2: allowed is >= 3"
+    data["rotors"][1]["blades"] = 1
+    assert refusal(data) == "body.inertia, body.mass: missing key; rotors[1].blades = 1: allowed is >= 2"
     data = sbs_data()
     data["rotors"][0]["hinge_offset"] = 0.6
     data["rotors"][1]["name"] = "MR1"

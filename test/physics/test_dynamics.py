@@ -136,6 +136,8 @@ AIRCRAFT = {
     },
     "one_duct": {"rotors": [{"duct": {"exit_area": 1.1}}, {"duct_expansion": 0.7}]},
     "four_and_five_blades": {"rotors": [{"blades": 4}, {"blades": 5}], "every_rotor": ODD_BLADE},
+    "two_and_three_blades": {"rotors": [{"blades": 2}, {"blades": 3}], "every_rotor": ODD_BLADE},
+    "two_blades": {"every_rotor": {**ODD_BLADE, "blades": 2}, "rotors": TILTED},
     "seven_and_twelve_blades": {
         "every_rotor": {"blade_mass": 0.05},
         "rotors": [{"blades": 7}, {"blades": 12}],

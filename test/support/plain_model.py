@@ -103,7 +103,7 @@ def multiblade_matrix(blades, psi, derivative=0):
     Parameters
     ----------
     blades : int
-        Number of blades N_b, 3 or more.
+        Number of blades N_b, 2 or more.
     psi : float
         Azimuth of blade 1 [rad].
     derivative : {0, 1, 2}

@@ -225,6 +225,12 @@ class Aircraft(Description):
         )
 
     @cached_property
+    def locked_names(self) -> frozenset[str]:
+        """Names of states that hold the coning of teetering rotors, which is given."""
+        rotors = [j + 1 for j, rotor in enumerate(self.rotors) if rotor.is_teetering]
+        return frozenset(f"{name}({j})" for j in rotors for name in ("a0", "da0"))
+
+    @cached_property
     def passages(self) -> tuple[int, ...]:
         """How often each rotor is the same again in one revolution: with every blade, or once if its blades differ."""
         return tuple(rotor.blades if rotor.has_equal_blades else 1 for rotor in self.rotors)

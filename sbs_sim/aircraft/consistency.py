@@ -136,6 +136,9 @@ def consistency_problems(aircraft: "Aircraft") -> list[str]:
         f"body.surfaces[{i}].name = {name!r}: used twice" for i, name in enumerate(surfaces) if name in surfaces[:i]
     ]
     problems += _drive_problems(aircraft, names)
+    problems += [
+        f"rotors[{i}].{p}" for i, rotor in enumerate(aircraft.rotors) for p in _teeter_problems(aircraft, rotor)
+    ]
     if problems:
         return problems
     if aircraft.body.is_stand:  # in place of a body
@@ -295,6 +298,18 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
         problems.append("duct.exit_area: missing; allowed is 0.25 to 4")
     problems += _range_problems("collective_range_deg", rotor.collective_range)
     return problems + _range_problems("cyclic_range_deg", rotor.cyclic_range)
+
+
+def _teeter_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
+    """What a teetering rotor cannot be."""
+    if not rotor.is_teetering:
+        return []
+    relations = [
+        (rotor.blades == 2, f"blades are {rotor.blades}: allowed are 2"),
+        (rotor.hinge_offset == 0.0, f"hinge_offset is {rotor.hinge_offset:g}: allowed is 0, the hinge is at the axis"),
+        (aircraft.options.coupling == "complete", "options.coupling is paper: allowed is complete"),
+    ]
+    return [f"flap_hinge = 'teetering', {text}" for is_met, text in relations if not is_met]
 
 
 def _damper_length(rotor: Rotor) -> float:

@@ -484,6 +484,12 @@ class Rotor(ByContent):
     flap_hinge_offset: float = number(
         "Distance of the flap hinge from the lag hinge", 0, 50, "m", symbol="e_F", model_field="flap_hinge_offset"
     )
+    flap_hinge: str = choice(
+        "each: a flap hinge of each blade; teetering: one for both blades of a rotor, at the axis, their coning is"
+        " flap_rest_deg",
+        ("each", "teetering"),
+        default="each",
+    )
     flap_spring: float = number(
         "Stiffness of the flap hinge", 0, 1e9, "N m/rad", symbol=r"K_\beta", model_field="flap_spring"
     )
@@ -703,6 +709,11 @@ class Rotor(ByContent):
         if self.blade_inertia is not None:
             return self.blade_inertia
         return self.blade_mass * (self.blade_length * self.blade_length) / 3
+
+    @property
+    def is_teetering(self) -> bool:
+        """Its blades have one flap hinge."""
+        return self.flap_hinge == "teetering"
 
     @property
     def lag_damping_factors(self) -> Array:

@@ -339,7 +339,8 @@ class IsolatedRotor:
         flap, lag = index[layout.flap_rate(0)], index[layout.lag_rate(0)]
         rates = np.concatenate([flap, lag]) if self.fidelity.lead_lag else flap
         velocities, inflows = S.VELOCITY + self._free, self.places[is_inflow] if inflow else index[:0]
-        return np.concatenate([deflections, angles, velocities, rates, inflows, self.places[is_speed]])
+        used = np.concatenate([deflections, angles, velocities, rates, inflows, self.places[is_speed]])
+        return np.array([i for i in used.tolist() if layout.names[i] not in self.aircraft.locked_names])
 
     def _matrices(self, point: RotorPoint, used: IntArray, psi: Array) -> Array:
         """System matrix at every azimuth, shape (m, n, n)."""

@@ -109,9 +109,7 @@ def solve_trim(
     if method == "two_loop" and (aircraft.drives or aircraft.body.is_stand):
         raise TrimError(f"method = 'two_loop': allowed {'with drives' if aircraft.drives else 'on a stand'} is newton")
     if aircraft.body.is_stand and has_two_blades(aircraft):
-        raise TrimError(
-            "body.stand: allowed with two blades is none; IsolatedRotor holds the hub of a rotor"
-        )
+        raise TrimError("body.stand: allowed with two blades is none; IsolatedRotor holds the hub of a rotor")
     if aircraft.body.is_stand:
         return rest(aircraft, condition, fidelity, _rest_guess(guess))
     if has_two_blades(aircraft):

@@ -19,6 +19,7 @@ from sbs_sim.model.dynamics import (
 )
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.state import set_vector
+from sbs_sim.model.teeter import hold_coning
 
 
 @entry
@@ -54,6 +55,8 @@ def steady_balance(model, x, swash, psi, wind, work, dx, imbalance):
     set_acceleration(memory, steady, Vector(0.0, 0.0, 0.0))
     if aircraft.switches[0].complete_coupling == 1:
         solve_blades(aircraft, memory)
+        if aircraft.switches[0].teetering == 1:
+            hold_coning(aircraft, memory)
     else:
         solve_blades_alone(aircraft, memory)
     set_body_rates(memory, flight, rates)

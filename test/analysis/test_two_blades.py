@@ -11,7 +11,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.floquet import floquet
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
 from sbs_sim.analysis.linearize import trim_effects
-from sbs_sim.errors import LinearizationError, TrimError
+from sbs_sim.errors import AircraftError, LinearizationError, TrimError
 from sbs_sim.flight.trim_point import Fidelity
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight.two_blades import substitute, trim_of_substitute
@@ -196,3 +196,53 @@ def test_a_damper_may_be_missing(two):
     point = trim(uneven, 8.0)
     assert point.residual < 1e-9
     assert any("unequal lag dampers" in line for line in point.warnings)
+
+
+def teetering(**more):
+    hinges = {"hinge_offset": 0.0, "flap_hinge_offset": 0.0, "flap_hinge": "teetering"}
+    return heavier(2, **hinges, **{"flap_spring": 0.0, "lag_spring": 400.0, "flap_rest_deg": 2.0, **more})
+
+
+@pytest.mark.parametrize("spring", [0.0, 40.0])
+def test_a_teetering_rotor_flaps_at_one_per_revolution(spring):
+    """Without a spring exactly; with one the root of 1 + K / (A_1 Omega^2). Coning is no state of its stability."""
+    changes = {"flap_spring": spring, "lag_damping": 0.0, "flap_rest_deg": 0.0}
+    aircraft = build(rotors=[teetering(**changes)], environment=WEIGHTLESS_VACUUM)
+    isolated, speed = IsolatedRotor(aircraft, Fidelity(lead_lag=False)), aircraft.rotors[0].speed
+    found = isolated.exponents(isolated.steady((0.0, 0.0, 0.0)), inflow=False)
+    assert len(found) == 2
+    turns = math.sqrt(1 + spring / (aircraft.rotors[0].second_moment * speed**2)) - 1
+    np.testing.assert_allclose(np.abs(found.imag), turns * speed, atol=2e-4 * speed)
+    np.testing.assert_allclose(found.real, 0.0, atol=1e-4 * speed)
+
+
+def test_a_teetering_helicopter_flies_its_trim():
+    """The coning is the precone, no spring or hinge offset tilts the hub, and the flight repeats."""
+    aircraft = build(every_rotor=teetering(), rotors=[{"hub": [0, -0.645, -0.3]}, {"hub": [0, 0.645, -0.3]}])
+    point = trim(aircraft, 10.0, lead_lag=False)
+    assert point["a0(1)"] == pytest.approx(math.radians(2.0), abs=1e-9)
+    period = 2 * math.pi / aircraft.rotors[0].speed
+    flight = simulate(aircraft, point, point.controls, 20 * period, tick=period, azimuth_step=0.1, lead_lag=False)
+    np.testing.assert_allclose(
+        flight["state"][-1][S.VELOCITY :], flight["state"][0][S.VELOCITY :], rtol=1e-3, atol=1e-3
+    )
+    names = {name for name in point.state_names if not name.startswith(("xi", "dxi"))}
+    assert len(floquet(aircraft, point).exponents) == len(names - {"a0(1)", "a0(2)", "da0(1)", "da0(2)"})
+
+
+def test_a_teetering_hub_feels_no_moment_of_flapping():
+    """Of a rotor without spring, offset, precone and lag the hub has no moment across the shaft, whatever its flap."""
+    aircraft = build(rotors=[teetering(flap_rest_deg=0.0)], environment={"gravity": 0.0})
+    point = IsolatedRotor(aircraft, Fidelity(lead_lag=False)).steady((0.12, 0.02, 0.03), 10.0)
+    assert np.abs(point.moment[:2]).max() < 2e-2 * abs(point.moment[2])
+
+
+def test_teetering_rotors_that_are_none():
+    for changes, says in (
+        ({"blades": 3}, "flap_hinge = 'teetering', blades are 3: allowed are 2"),
+        ({"hinge_offset": 0.01}, "'teetering', hinge_offset is 0.01: allowed is 0, the hinge is at the axis"),
+    ):
+        with pytest.raises(AircraftError, match=says):
+            build(rotors=[teetering() | changes])
+    with pytest.raises(AircraftError, match=r"'teetering', options\.coupling is paper: allowed is complete"):
+        build(rotors=[teetering()], options={"coupling": "paper"})

@@ -121,8 +121,18 @@ STANDS = {
     "mixed": {"free": ["x", "pitch", "yaw"], "mass": [30.0, 0, 0, 0, 4.0, 2.0], "spring": [900.0, 0, 0, 0, 8.0, 0]},
     "locked": {"free": []},
 }
+TEETERING = {
+    **ODD_BLADE,
+    "blades": 2,
+    "hinge_offset": 0.0,
+    "flap_hinge_offset": 0.0,
+    "flap_hinge": "teetering",
+}
 AIRCRAFT = {
     "sbs": {},
+    "teetering": {"every_rotor": TEETERING, "rotors": TILTED},
+    "one_teeters": {"every_rotor": ODD_BLADE, "rotors": [TEETERING, {"blades": 3}]},
+    "teetering_on_a_stand": {"every_rotor": TEETERING, "rotors": TILTED, "body": {"stand": STANDS["mixed"]}},
     "sbs_paper": {"name": "sbs_paper"},
     "paper_coupling_only": {"options": {"coupling": "paper"}},
     "paper_and_odd_blades": {"name": "sbs_paper", "every_rotor": ODD_BLADE, "rotors": TILTED},

@@ -170,7 +170,8 @@ class Aircraft(Description):
             Paths and values as for `with_value`. Where two paths stand for one value the later one counts:
             {"rotors.radius": 0.4, "rotors.MR1.radius": 0.5}. An element of the inertia off the diagonal sets the
             symmetric one, too: "body.inertia[0][1]" is "body.inertia[1][0]". "environment.altitude" takes the place
-            of density, viscosity and speed of sound.
+            of density, viscosity and speed of sound, "rotors.mass_distribution" that of mass, c.g. and inertia of a
+            blade.
 
         Raises
         ------
@@ -179,13 +180,15 @@ class Aircraft(Description):
         """
         checks.instance("values", values, Mapping, AircraftError)
         plain = {path: _python(value) for path, value in values.items()}
-        data, pairs = self.data, dict[Location, tuple[str, Any]]()
+        data, pairs, given = self.data, dict[Location, tuple[str, Any]](), list[Location]()
         for path, value in plain.items():
             for location in locations(data, schema_of(type(self)), path):
                 for one in (location, mirrored(location)):
                     data = replaced(data, one, value)
-                data = without(data, instead_of(location), plain)
+                given.append(location)
                 _check_pair(pairs, location, path, value)
+        for location in dict.fromkeys(other for one in given for other in instead_of(one) if other not in given):
+            data = without(data, location)
         try:
             return self._made_of(data, self.folder, self)
         except AircraftError as error:
@@ -220,6 +223,12 @@ class Aircraft(Description):
         return StateLayout(
             tuple(rotor.blades for rotor in self.rotors), tuple(drive.state_names for drive in self.drives)
         )
+
+    @cached_property
+    def locked_names(self) -> frozenset[str]:
+        """Names of states that hold the coning of teetering rotors, which is given."""
+        rotors = [j + 1 for j, rotor in enumerate(self.rotors) if rotor.is_teetering]
+        return frozenset(f"{name}({j})" for j in rotors for name in ("a0", "da0"))
 
     @cached_property
     def passages(self) -> tuple[int, ...]:

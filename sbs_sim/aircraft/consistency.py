@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sbs_sim import checks
+from sbs_sim.aircraft.blade_mass import MIN_BLADE_MASS
 from sbs_sim.aircraft.description import STAND_AXES, TRIMMED_CONTROLS, Array, Range, Rotor
 from sbs_sim.aircraft.part_consistency import part_problems
 from sbs_sim.model.airfoil import FINEST_DEG, MAX_HALF, NUMBER_NAMES, common_half
@@ -26,7 +28,7 @@ LINE, TABLE = ("root", "tip"), ("stations", "values")  # the two ways to give va
 
 def table_problems(rotors: Sequence[Rotor]) -> list[str]:
     """What is wrong with the values along the blades, which are checked before the mean chord is needed."""
-    return [
+    problems = [
         f"rotors[{i}].{key}{problem}"
         for i, rotor in enumerate(rotors)
         for key, name in (("chord", "chord"), ("twist_deg", "twist"))
@@ -35,6 +37,9 @@ def table_problems(rotors: Sequence[Rotor]) -> list[str]:
         f"rotors[{i}].outboard_airfoils{problem}"
         for i, rotor in enumerate(rotors)
         for problem in _airfoil_problems(rotor.outboard_stations, rotor.outboard_airfoils)
+    ]
+    return problems + [
+        f"rotors[{i}].mass_distribution{p}" for i, rotor in enumerate(rotors) for p in _mass_problems(rotor)
     ]
 
 
@@ -76,11 +81,34 @@ def _table_problems(**parts: Any) -> list[str]:
         return [f".{missing[0]}: missing key"]
     if kinds[0] == LINE:
         return []
-    stations, values = parts["stations"], parts["values"]
+    if problems := _station_problems(parts["stations"], parts["values"]):
+        return problems
+    if not np.all(np.diff(parts["stations"]) > 0):
+        return [f".stations = {parts['stations'].tolist()}: allowed are increasing numbers"]
+    return []
+
+
+def _station_problems(stations: Array | None, values: Array | None) -> list[str]:
+    """A part of a table that is not there, or parts of two lengths."""
+    if stations is None or values is None:
+        return [".stations: missing key" if stations is None else ".values: missing key"]
     if len(stations) != len(values):
         return [f".values: allowed are {len(stations)} numbers, one of each station, not {len(values)}"]
-    if not np.all(np.diff(stations) > 0):
-        return [f".stations = {stations.tolist()}: allowed are increasing numbers"]
+    return []
+
+
+def _mass_problems(rotor: Rotor) -> list[str]:
+    """What is wrong with the mass along the blades."""
+    stations, values = rotor.mass_stations, rotor.mass_values
+    if stations is None and rotor.blade_mass > 0.0:  # the file gives the integrals
+        return []
+    if problems := _station_problems(stations, values):
+        return problems
+    assert stations is not None and values is not None, "checked above"  # noqa: PT018
+    if not np.all(np.diff(stations) >= 0):
+        return [f".stations = {stations.tolist()}: allowed are numbers in order"]
+    if rotor.blade_mass < MIN_BLADE_MASS and rotor.hinge_offset < rotor.radius:
+        return [f".values = {checks.shown(values.tolist())}: allowed is some mass between flap hinge and tip"]
     return []
 
 
@@ -108,6 +136,9 @@ def consistency_problems(aircraft: "Aircraft") -> list[str]:
         f"body.surfaces[{i}].name = {name!r}: used twice" for i, name in enumerate(surfaces) if name in surfaces[:i]
     ]
     problems += _drive_problems(aircraft, names)
+    problems += [
+        f"rotors[{i}].{p}" for i, rotor in enumerate(aircraft.rotors) for p in _teeter_problems(aircraft, rotor)
+    ]
     if problems:
         return problems
     if aircraft.body.is_stand:  # in place of a body
@@ -244,7 +275,9 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
             f"<= {length / math.sqrt(3):.6g}, L/sqrt(3): the blade's second moment is m_b L^2/3",
         ),
         (
-            rotor.blade_inertia is None or rotor.blade_inertia >= rotor.first_moment * rotor.blade_cg,
+            rotor.blade_inertia is None
+            or rotor.mass_stations is not None
+            or rotor.blade_inertia >= rotor.first_moment * rotor.blade_cg,
             "blade_inertia",
             f">= {rotor.first_moment * rotor.blade_cg:.6g}, blade_mass blade_cg^2",
         ),
@@ -267,6 +300,18 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
         problems.append("duct.exit_area: missing; allowed is 0.25 to 4")
     problems += _range_problems("collective_range_deg", rotor.collective_range)
     return problems + _range_problems("cyclic_range_deg", rotor.cyclic_range)
+
+
+def _teeter_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
+    """What a teetering rotor cannot be."""
+    if not rotor.is_teetering:
+        return []
+    relations = [
+        (rotor.blades == 2, f"blades are {rotor.blades}: allowed are 2"),
+        (rotor.hinge_offset == 0.0, f"hinge_offset is {rotor.hinge_offset:g}: allowed is 0, the hinge is at the axis"),
+        (aircraft.options.coupling == "complete", "options.coupling is paper: allowed is complete"),
+    ]
+    return [f"flap_hinge = 'teetering', {text}" for is_met, text in relations if not is_met]
 
 
 def _damper_length(rotor: Rotor) -> float:

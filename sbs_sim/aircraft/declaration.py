@@ -184,10 +184,23 @@ def part(
     )
 
 
-def parts(text: str, record: type, minimum: int, maximum: int, **more: Any) -> Any:
-    """Declare a list of such mappings."""
-    schema = list_schema(schema_of(record), minimum, maximum)
-    return declared(text, schema, lambda items: tuple(read(record, data) for data in items), record=record, **more)
+def parts(
+    text: str,
+    record: type,
+    minimum: int,
+    maximum: int,
+    *,
+    rules: Mapping[str, Any] = MappingProxyType({}),
+    complete: Callable[[Any], Any] = lambda data: data,
+    **more: Any,
+) -> Any:
+    """Declare a list of such mappings, with the rules and the completion of each."""
+    schema = list_schema({**schema_of(record), **rules}, minimum, maximum)
+
+    def read_all(items: list[Any]) -> tuple[Any, ...]:
+        return tuple(read(record, complete(data)) for data in items)
+
+    return declared(text, schema, read_all, record=record, **more)
 
 
 def declared(text: str, schema: Mapping[str, Any], reader: Callable[[Any], Any], **more: Any) -> Any:

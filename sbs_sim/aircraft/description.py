@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.aircraft.atmosphere import MAX_ALTITUDE, MIN_ALTITUDE, standard_air
+from sbs_sim.aircraft.blade_mass import MIN_BLADE_MASS, with_blade_mass
 from sbs_sim.aircraft.declaration import (
     array,
     choice,
@@ -403,17 +404,26 @@ def _linkage(letter: str, text: str) -> Any:
 
 MAX_STATIONS, MAX_AIRFOILS = 200, 20
 
+# Keys of a rotor of which a file has the last one, or the others.
+BLADE_MASS, DERIVED_FROM = ("blade_mass", "blade_cg", "blade_inertia"), ("mass_distribution",)
+MASS_RULES = {
+    "if": {"required": list(DERIVED_FROM)},
+    "then": {"properties": {key: left_out("where the rotor has mass_distribution") for key in BLADE_MASS}},
+    "else": {"required": ["blade_cg", "blade_mass"]},
+}
 
-def _stations(key: str) -> Any:
+
+def _stations(key: str, more: str = "increasing; in place of root and tip") -> Any:
     """Field with the stations of a table along the blade."""
     return declared(
-        f"Stations of {key}.values as shares of the radius from the axis, increasing; in place of root and tip",
+        f"Stations of {key}.values as shares of the radius from the axis, {more}",
         list_schema(number_schema(0, 1), 2, MAX_STATIONS),
         frozen,
         unit="1",
         key=f"{key}.stations",
         symbol="c" if key == "chord" else "",
         default=None,
+        is_physics=key not in DERIVED_FROM,
     )
 
 
@@ -447,22 +457,60 @@ class Rotor(ByContent):
     )
     speed: float = number("Rotor speed", 1, 100000, "rpm", symbol=r"\Omega", model_field="rotor_speed")
     radius: float = number("Rotor radius", 0.01, 50, "m", symbol="R", model_field="radius")
-    blades: int = integer("Number of blades", 3, MAX_BLADES, symbol="N_b")
-    blade_mass: float = number("Mass of a blade", 1e-12, 1e4, "kg", symbol="m_b", model_field="mass")
-    blade_cg: float = number("Distance of a blade's c.g. from the flap hinge", 1e-12, 50, "m", symbol="r_G")
+    blades: int = integer("Number of blades", 2, MAX_BLADES, symbol="N_b")
+    blade_mass: float = number(
+        "Mass of a blade; follows from `mass_distribution` where the file has that",
+        MIN_BLADE_MASS,
+        1e4,
+        "kg",
+        symbol="m_b",
+        model_field="mass",
+        is_derivable=True,
+    )
+    blade_cg: float = number(
+        "Distance of a blade's c.g. from the flap hinge; follows from `mass_distribution` where the file has that",
+        1e-12,
+        50,
+        "m",
+        symbol="r_G",
+        is_derivable=True,
+    )
     blade_inertia: float | None = number(
-        "Second moment of a blade about the flap hinge; of a uniform blade by options.flap_inertia if left out",
+        "Second moment of a blade about the flap hinge; of a uniform blade by options.flap_inertia if left out; follows"
+        " from `mass_distribution` where the file has that",
         1e-12,
         1e9,
         "kg m^2",
         symbol="A_1",
         default=None,
     )
+    mass_stations: Array | None = _stations(
+        "mass_distribution",
+        "in order, one that occurs twice is a step; in place of blade_mass, blade_cg and blade_inertia",
+    )
+    mass_values: Array | None = _station_values(
+        "Mass of a blade per length", 0, 1e5, "kg/m", key="mass_distribution.values", is_physics=False
+    )
+    tip_mass: float = number(
+        "Mass at the tip of a blade, beside that of the stations",
+        0,
+        1e4,
+        "kg",
+        key="mass_distribution.tip_mass",
+        default=0.0,
+        is_physics=False,  # the integrals that follow are
+    )
     hinge_offset: float = number(
         "Distance of the flap hinge from the axis", 0, 50, "m", symbol="e_0", model_field="hinge_offset"
     )
     flap_hinge_offset: float = number(
         "Distance of the flap hinge from the lag hinge", 0, 50, "m", symbol="e_F", model_field="flap_hinge_offset"
+    )
+    flap_hinge: str = choice(
+        "each: a flap hinge of each blade; teetering: one for both blades of a rotor, at the axis, their coning is"
+        " flap_rest_deg",
+        ("each", "teetering"),
+        default="each",
     )
     flap_spring: float = number(
         "Stiffness of the flap hinge", 0, 1e9, "N m/rad", symbol=r"K_\beta", model_field="flap_spring"
@@ -683,6 +731,11 @@ class Rotor(ByContent):
         if self.blade_inertia is not None:
             return self.blade_inertia
         return self.blade_mass * (self.blade_length * self.blade_length) / 3
+
+    @property
+    def is_teetering(self) -> bool:
+        """Its blades have one flap hinge."""
+        return self.flap_hinge == "teetering"
 
     @property
     def lag_damping_factors(self) -> Array:
@@ -955,7 +1008,9 @@ class Description(ByContent):
     body: Body = part("The whole aircraft, blades included", Body)
     options: Options = part("How the model reads the equations", Options)
     controls: tuple[Control, ...] = _controls()
-    rotors: tuple[Rotor, ...] = parts(f"The rotors, 1 to {MAX_ROTORS} of them", Rotor, 1, MAX_ROTORS)
+    rotors: tuple[Rotor, ...] = parts(
+        f"The rotors, 1 to {MAX_ROTORS} of them", Rotor, 1, MAX_ROTORS, rules=MASS_RULES, complete=with_blade_mass
+    )
     drives: tuple[Drive, ...] = parts(
         "Drives, which make the speeds of their rotors states of the model; without one a rotor keeps its speed",
         Drive,

@@ -117,6 +117,7 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
     switches["stand"] = aircraft.body.is_stand
     switches["ducts"] = any(rotor.duct_exit is not None for rotor in aircraft.rotors)
+    switches["teetering"] = any(rotor.is_teetering for rotor in aircraft.rotors)
     return switches
 
 
@@ -220,6 +221,7 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
         integers = {
             "blades": rotor.blades,
             "harmonics": harmonic_count(rotor.blades),
+            "teetering": rotor.is_teetering,
             "first_quad": quads[j],
             "quads": quads[j + 1] - quads[j],
             "flap": layout.flap(j).start,

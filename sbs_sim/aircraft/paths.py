@@ -7,7 +7,7 @@ from typing import Any
 
 from sbs_sim import checks
 from sbs_sim.aircraft.declaration import units
-from sbs_sim.aircraft.description import GIVEN_AIR, Description
+from sbs_sim.aircraft.description import BLADE_MASS, DERIVED_FROM, GIVEN_AIR, Description
 from sbs_sim.errors import AircraftError
 
 Location = tuple[str | int, ...]
@@ -115,16 +115,23 @@ def mirrored(location: Location) -> Location:
     return location
 
 
-def instead_of(location: Location) -> tuple[str, ...]:
-    """Paths whose values the one at a location replaces: an altitude those of the air that follow from it."""
-    return tuple(f"environment.{key}" for key in GIVEN_AIR) if location == ("environment", "altitude") else ()
+def instead_of(location: Location) -> list[Location]:
+    """Locations of values that the one at a location replaces, since they follow from it.
+
+    An altitude replaces the air; a distribution of mass replaces mass, c.g. and inertia of a blade.
+    """
+    if location == ("environment", "altitude"):
+        return [("environment", key) for key in GIVEN_AIR]
+    if location[:1] == ("rotors",) and location[2:3] == DERIVED_FROM:
+        return [(*location[:2], key) for key in BLADE_MASS]
+    return []
 
 
-def without(data: Any, paths: Sequence[str], kept: Mapping[str, Any]) -> Any:
-    """Copy of the mapping of an aircraft file without the values at some paths of two keys, but for those kept."""
-    for part, key in (path.split(".") for path in paths if path not in kept):
-        data = {**data, part: {name: value for name, value in data[part].items() if name != key}}
-    return data
+def without(data: Any, location: Location) -> Any:
+    """Copy of nested mappings and lists without the value at a location, if there is one."""
+    *steps, last = location
+    inner = value_at(data, tuple(steps))
+    return replaced(data, tuple(steps), {key: value for key, value in inner.items() if key != last})
 
 
 def separate(data: Any) -> Any:

@@ -63,7 +63,7 @@ def used_states(point: TrimPoint) -> NDArray[np.int64]:
     return np.array(used)
 
 
-def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) -> Array:
+def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array, states: Array | None = None) -> Array:
     """Derivatives of all outputs of `sbs_sim.model.linear` by states and controls, at each azimuth.
 
     Parameters
@@ -73,6 +73,8 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
     psi : ndarray, shape (n_azimuths, n_rotors)
         [rad]
     steps : ndarray, shape (linear_size + n_controls,)
+    states : ndarray, shape (n_azimuths, linear_size), optional
+        At each azimuth; that of the trim if not given.
 
     Returns
     -------
@@ -80,9 +82,15 @@ def jacobians(aircraft: Aircraft, point: TrimPoint, psi: Array, steps: Array) ->
         Columns of states that the fidelity leaves out are zero.
     """
     engine = points_engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "points"))
-    inputs = np.concatenate([point.state, point.controls])
-    used = np.zeros(len(inputs), dtype=bool)
+    used = np.zeros(len(point.state) + len(point.controls), dtype=bool)
     used[used_states(point)] = used[len(point.state) :] = True
     steps = np.where(used, steps, 0.0)
-    found = engine.jacobian(inputs, aircraft.rigging, steps, aircraft.layout.linear_owners, psi)
-    return found.transpose(0, 2, 1)
+
+    def at(state: Array, azimuths: Array) -> Array:
+        inputs = np.concatenate([state, point.controls])
+        return engine.jacobian(inputs, aircraft.rigging, steps, aircraft.layout.linear_owners, azimuths)
+
+    if states is None:
+        return at(point.state, psi).transpose(0, 2, 1)
+    each = [at(state, own[np.newaxis])[0].T for state, own in zip(states, psi, strict=True)]
+    return np.array(each)

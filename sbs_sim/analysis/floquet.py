@@ -16,14 +16,15 @@ from scipy.optimize import linear_sum_assignment
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.differences import difference_steps, jacobians, used_states
+from sbs_sim.analysis.periodic import Period, common_period
 from sbs_sim.content import ByContent
 from sbs_sim.errors import LinearizationError
-from sbs_sim.flight.trim_point import TrimPoint
+from sbs_sim.flight.trim_point import Fidelity, TrimPoint
+from sbs_sim.flight.two_blades import has_two_blades
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-MAX_PASSAGES = 60  # of any rotor in one common period
 AZIMUTH_COUNTS = (8, 1000)
 TAYLOR_DEGREE, TAYLOR_REACH = 12, 0.4  # a multiple of three; 1-norm
 
@@ -65,7 +66,7 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
     ----------
     aircraft : Aircraft
     point : TrimPoint
-        The mean state about which is linearized.
+        The mean state about which is linearized; with two blades the motion over a revolution that it begins.
     azimuth_count : int
         Number of instants of one period at which the model is linearized, even, 8 to 1000; two make a step.
 
@@ -88,8 +89,9 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
     period, _ = common_period(aircraft)
     times = period * np.arange(azimuth_count) / azimuth_count
     psi = times[:, None] * np.array([rotor.speed for rotor in aircraft.rotors])
-    used = used_states(point)
-    a = jacobians(aircraft, point, psi, difference_steps(aircraft))[:, used][:, :, used]
+    used = np.array([i for i in used_states(point) if point.state_names[i] not in aircraft.locked_names])
+    states = _orbit(aircraft, point, azimuth_count) if has_two_blades(aircraft) else None
+    a = jacobians(aircraft, point, psi, difference_steps(aircraft), states)[:, used][:, :, used]
     monodromy = transition(a, period)
     multipliers = np.linalg.eigvals(monodromy).astype(complex)
     poles = np.linalg.eigvals(a.mean(axis=0)).astype(complex)
@@ -98,27 +100,11 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
     return Floquet(period, monodromy, multipliers, exponents, poles)
 
 
-def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
-    """Shortest time in which every rotor passes an integer number of blades [s], and those numbers.
-
-    The differential coordinate of an even number of blades changes its sign with every blade: such a rotor passes an
-    even number. One whose blades differ passes all of them.
-
-    Raises
-    ------
-    LinearizationError
-        There is none of at most 60 passages.
-    """
-    blades = np.array([rotor.blades for rotor in aircraft.rotors])
-    equal = np.array([rotor.has_equal_blades for rotor in aircraft.rotors])
-    each = np.where(equal, np.where(blades % 2 == 0, 2, 1), blades)
-    passage = each * 2.0 * math.pi / (blades * np.array([rotor.speed for rotor in aircraft.rotors]))
-    for count in range(1, MAX_PASSAGES + 1):
-        period = count * float(passage.max())
-        numbers = np.round(period / passage)
-        if np.all(np.abs(numbers * passage - period) < 1e-9 * period):
-            return period, [int(number) for number in numbers * each]
-    raise LinearizationError(f"the blade passages of the rotors have no common period of up to {MAX_PASSAGES} of them")
+def _orbit(aircraft: Aircraft, point: TrimPoint, count: int) -> Array:
+    """Linear states of the periodic flight of two blades, shape (count, linear_size)."""
+    period = Period(aircraft, Fidelity(point.lead_lag, point.cyclic_inflow), instants=count)
+    way = period.orbit(aircraft.layout.from_linear(point.state), point.swashplate)
+    return np.array([aircraft.layout.to_linear(state) for state in way])
 
 
 def transition(a: Array, period: float) -> Array:

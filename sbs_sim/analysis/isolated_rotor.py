@@ -6,7 +6,7 @@ Its speed is given, or follows from the torque where it turns freely.
 from __future__ import annotations  # `help` then shows types by their names
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,12 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.floquet import transition
 from sbs_sim.analysis.newton import newton
+from sbs_sim.analysis.periodic import Period, solved
 from sbs_sim.content import ByContent
 from sbs_sim.errors import TrimError
-from sbs_sim.flight.engine import points_engine
+from sbs_sim.flight.engine import Engine, points_engine
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition
+from sbs_sim.flight.two_blades import at_azimuths, has_two_blades, of_substitute, substitute
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
@@ -46,7 +48,7 @@ class RotorPoint(ByContent):
     swashplate : ndarray, shape (3,)
         Collective, lateral and longitudinal cyclic pitch [rad].
     state : ndarray, shape (size,)
-        Simulation state, with the hub's velocity and attitude in its body part.
+        Simulation state, with the hub's velocity and attitude in its body part; of two blades with the first one aft.
     places : ndarray of int64, shape (n,)
         Indices in it of the unknowns: deflections of a stand, flap, lag where it moves, inflow, speed where it turns
         freely.
@@ -88,7 +90,8 @@ class IsolatedRotor:
     Raises
     ------
     TrimError
-        The aircraft has several rotors, or an engine.
+        The aircraft has several rotors, or an engine; or a rotor with two blades that turns freely, or on a stand that
+        gives way.
     """
 
     def __init__(self, aircraft: Aircraft, fidelity: Fidelity | None = None) -> None:
@@ -103,6 +106,10 @@ class IsolatedRotor:
         self.aircraft, self.fidelity = aircraft, fidelity or Fidelity()
         self.rotor, self.layout = aircraft.rotors[0], aircraft.layout
         self._free = np.flatnonzero(aircraft.body.stand_free) if aircraft.body.is_stand else np.zeros(0, dtype=np.int64)
+        # of two blades, which have no constant coordinates
+        self._mean_rotor = IsolatedRotor(substitute(aircraft), self.fidelity) if has_two_blades(aircraft) else None
+        if self._mean_rotor is not None and (len(self._free) or self.is_driven):
+            raise TrimError(f"{self.rotor.name} has 2 blades: allowed for them is a hub that is held, at a given speed")
         self._azimuths = azimuths(aircraft.passages, self.fidelity.azimuth_count)
         self.places, self.rate_places = self._unknowns()
         is_inflow, is_speed = self._is_inflow(self.rate_places), self.rate_places >= self.layout.drives_start
@@ -157,6 +164,8 @@ class IsolatedRotor:
             checks.number(name, value, low, high, unit, TrimError)
         if len(self._free) and pitch:
             raise TrimError(f"pitch = {pitch:g} rad: allowed is 0 on a stand that gives way, whose rest is level")
+        if self._mean_rotor is not None:
+            return self._periodic(self._mean_rotor, swashplate, given, start)
         x, swash = self._flight(airspeed, climb_rate, pitch), np.array(swashplate, dtype=float)
         x = x if start is None else _with(x, self.places, start.state[start.places])
 
@@ -172,6 +181,37 @@ class IsolatedRotor:
         state = _with(x, self.places, found.values * self._units)
         return self._point(state, swash, float(np.abs(found.residual).max()))
 
+    def _periodic(
+        self, mean_rotor: IsolatedRotor, swashplate: Sequence[float], given: dict[str, float], start: RotorPoint | None
+    ) -> RotorPoint:
+        """Periodic motion of two blades near the steady motion of their substitute."""
+        speeds = np.array([self.rotor.speed])
+        if start is not None:
+            start = replace(start, state=of_substitute(self.aircraft, start.state, speeds), places=mean_rotor.places)
+        found = mean_rotor.steady(swashplate, **given, start=start)
+        begin = at_azimuths(self.aircraft, found.state, np.zeros((1, 1)), speeds)[0]
+        period = Period(self.aircraft, self.fidelity, _held)
+
+        def states(values: Array) -> Array:
+            made = np.repeat(begin[np.newaxis], len(values), axis=0)
+            made[:, period.places] += values * period.scales
+            return made
+
+        def residuals(values: Array) -> Array:
+            starts = states(values)
+            return period.rotor_balance(starts, period.ends(starts, np.repeat([found.swashplate], len(values), axis=0)))
+
+        values = solved(residuals, len(period.places), self.rotor.name)[np.newaxis]
+        x = states(values)[0]
+        loads = period.flown(x[np.newaxis], found.swashplate[np.newaxis])[2][0, 0]
+        return self._result(x, found.swashplate, loads, float(np.abs(residuals(values)).max()))
+
+    def _along(self, point: RotorPoint, psi: Array) -> list[Array]:
+        """States of a steady motion at equal steps of the azimuth over a revolution, shape (m, 1)."""
+        if self._mean_rotor is None:
+            return [point.state] * len(psi)
+        return list(Period(self.aircraft, self.fidelity, _held, len(psi)).orbit(point.state, point.swashplate))
+
     def _flight(self, airspeed: float, climb_rate: float, pitch: float) -> Array:
         """State of the hub with the rotor's states where the search begins."""
         x = np.zeros(self.layout.size)
@@ -183,7 +223,9 @@ class IsolatedRotor:
         return x
 
     def _point(self, x: Array, swash: Array, residual: float) -> RotorPoint:
-        loads = self._mean(x, swash)[1]
+        return self._result(x, swash, self._mean(x, swash)[1], residual)
+
+    def _result(self, x: Array, swash: Array, loads: Array, residual: float) -> RotorPoint:
         rotor, density = self.rotor, self.aircraft.environment.air_density
         speed = float(self.aircraft.rotor_speeds(x)[0])
         tip_speed = speed * rotor.radius
@@ -242,7 +284,16 @@ class IsolatedRotor:
         names : tuple of str
             Of its n states, those of the simulation state: deflections of a stand (in rotation half the angles),
             angles, velocities of the stand, rates of the angles, inflow, speed of a rotor that turns freely.
+
+        Raises
+        ------
+        TrimError
+            A rotor with two blades.
         """
+        if self._mean_rotor is not None:
+            raise TrimError(
+                f"{self.rotor.name} has 2 blades: no constant matrix describes them; `exponents` are theirs"
+            )
         used = self._used(inflow)
         return self._matrices(point, used, self._azimuths).mean(axis=0), tuple(self.layout.names[i] for i in used)
 
@@ -290,17 +341,18 @@ class IsolatedRotor:
         flap, lag = index[layout.flap_rate(0)], index[layout.lag_rate(0)]
         rates = np.concatenate([flap, lag]) if self.fidelity.lead_lag else flap
         velocities, inflows = S.VELOCITY + self._free, self.places[is_inflow] if inflow else index[:0]
-        return np.concatenate([deflections, angles, velocities, rates, inflows, self.places[is_speed]])
+        used = np.concatenate([deflections, angles, velocities, rates, inflows, self.places[is_speed]])
+        return np.array([i for i in used.tolist() if layout.names[i] not in self.aircraft.locked_names])
 
     def _matrices(self, point: RotorPoint, used: IntArray, psi: Array) -> Array:
         """System matrix at every azimuth, shape (m, n, n)."""
-        index, layout, columns = np.arange(self.layout.size), self.layout, []
+        index, layout, columns, states = np.arange(self.layout.size), self.layout, [], self._along(point, psi)
         rates = {*index[layout.flap_rate(0)].tolist(), *index[layout.lag_rate(0)].tolist()}
         rates |= set(self.places[self.places >= layout.drives_start].tolist())
         for i in used.tolist():
             step = RATE_STEP * self.rotor.speed if i in rates else ANGLE_STEP
             after, before = (
-                self._rates([_moved(point.state, i, change)] * len(psi), point.swashplate, psi)[0]
+                self._rates([_moved(state, i, change) for state in states], point.swashplate, psi)[0]
                 for change in (step, -step)
             )
             columns.append((after - before)[:, used] / (2.0 * step))
@@ -314,6 +366,13 @@ def _with(x: Array, places: IntArray, values: Array) -> Array:
     turn = changed[S.ATTITUDE + 1 : S.ATTITUDE + 4]
     changed[S.ATTITUDE] = np.sqrt(1.0 - turn @ turn)
     return changed
+
+
+def _held(engine: Engine, x: Array, swashplate: Array, psi: Array) -> Array:
+    """Rates and loads of a rotor whose hub moves steadily."""
+    slopes = engine.tick.slopes[0]
+    steady_balance(engine.model, x, swashplate, psi, engine.memory(3), engine.work, slopes, engine.memory(6))
+    return np.asarray(slopes)
 
 
 def _moved(x: Array, place: int, step: float) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.control_effects import ControlEffect
 from sbs_sim.analysis.differences import difference_steps, jacobians, used_states
 from sbs_sim.analysis.kinematics import kinematics
 from sbs_sim.analysis.linear_model import LinearModel
@@ -23,6 +24,7 @@ from sbs_sim.analysis.stand_model import StandModel
 from sbs_sim.analysis.trim import Guess, trim
 from sbs_sim.errors import LinearizationError
 from sbs_sim.flight.trim_point import StandPoint, TrimPoint
+from sbs_sim.flight.two_blades import has_two_blades, substitute, trim_of_substitute
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
 from sbs_sim.model.elementary import cosine_and_sine
@@ -71,9 +73,10 @@ def linearize(
     TrimError
         See `sbs_sim.trim`.
     LinearizationError
-        A value out of range, a trim of another aircraft, or a condition together with a trim.
+        A value out of range, a trim of another aircraft, a condition together with a trim, or a rotor with two blades.
     """
     _check_options(aircraft, method, step_scale)
+    _check_blades(aircraft)
     given: dict[str, Any] = {
         "airspeed": airspeed,
         "climb_rate": climb_rate,
@@ -98,6 +101,7 @@ def linearize_trim(
 ) -> LinearModel:
     """Linearize an aircraft about a trim of it; see `linearize`."""
     step_scale = _check_options(aircraft, method, step_scale)
+    _check_blades(aircraft)
     checks.instance("point", point, TrimPoint, LinearizationError)
     if method == "paper" and aircraft.drives:
         raise LinearizationError("method = 'paper': allowed with drives is averaged")
@@ -121,6 +125,22 @@ def _check_options(aircraft: Aircraft, method: str, step_scale: float) -> float:
     checks.instance("aircraft", aircraft, Aircraft, LinearizationError)
     checks.choice("method", method, METHODS, LinearizationError)
     return checks.number("step_scale", step_scale, *STEP_SCALES, "", LinearizationError)
+
+
+def trim_effects(aircraft: Aircraft, point: TrimPoint) -> tuple[ControlEffect, ...]:
+    """What each control does about a trim of an aircraft; with two blades in the mean over a revolution."""
+    if has_two_blades(aircraft):
+        aircraft, point = substitute(aircraft), trim_of_substitute(aircraft, point)
+    return linearize_trim(aircraft, point).control_effects
+
+
+def _check_blades(aircraft: Aircraft) -> None:
+    for rotor in aircraft.rotors:
+        if rotor.blades == 2:
+            raise LinearizationError(
+                f"{rotor.name} has 2 blades: no constant model describes them; stability is that of Floquet's method,"
+                " linearize --floquet or sbs_sim.analysis.floquet"
+            )
 
 
 def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> LinearModel:

@@ -26,6 +26,7 @@ from sbs_sim.analysis.trim import Guess, checked_guess, solve_trim
 from sbs_sim.concurrency.parallel import Execution, compute
 from sbs_sim.errors import AircraftError, SbsError, SweepError
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
+from sbs_sim.flight.two_blades import has_two_blades
 from sbs_sim.model import state as S
 from sbs_sim.output.notebook import sweep_html
 from sbs_sim.output.units import shown
@@ -360,7 +361,8 @@ def _solve(
         else:
             aircraft = aircraft.with_value(parameter, value)
         point = solve_trim(aircraft, condition, fidelity, guess=guess)
-        return SweepPoint(value, point, linearize_trim(aircraft, point) if linear else None, None)
+        has_model = linear and not has_two_blades(aircraft)  # two blades have no constant one
+        return SweepPoint(value, point, linearize_trim(aircraft, point) if has_model else None, None)
     except SbsError as error:
         return SweepPoint(value, point, None, str(error))
 

@@ -6,19 +6,29 @@ nested loops are there to compare with.
 
 from __future__ import annotations  # `help` then shows types by their names
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.newton import MAX_UNKNOWN
+from sbs_sim.analysis.periodic import Period, periodic
 from sbs_sim.analysis.stand import rest
 from sbs_sim.analysis.trim_guess import MomentumTheory
-from sbs_sim.analysis.trim_problem import TrimProblem
+from sbs_sim.analysis.trim_problem import UNEQUAL_BLADES, TrimProblem
 from sbs_sim.analysis.trim_search import find
 from sbs_sim.analysis.two_loop import solve_by_two_loops
 from sbs_sim.errors import TrimError
 from sbs_sim.flight.trim_point import Fidelity, StandPoint, TrimCondition, TrimPoint
+from sbs_sim.flight.two_blades import (
+    has_two_blades,
+    of_substitute,
+    substitute,
+    trim_of_substitute,
+    with_two_blades,
+)
 from sbs_sim.model import state as S
 from sbs_sim.model.state import StateLayout
 
@@ -75,9 +85,9 @@ def trim(
     Raises
     ------
     TrimError
-        A value out of range, or no solution: the message says what stops it (rotors that cannot
-        carry the weight, a rotor that stalls, a control beyond its range), and with the attributes which equation is
-        left with what.
+        A value out of range; two blades on a stand, with drives, or with rotors of no common period; or no solution:
+        the message says what stops it (rotors that cannot carry the weight, a rotor that stalls, a control beyond its
+        range), and with the attributes which equation is left with what.
     """
     checks.instance("aircraft", aircraft, Aircraft, TrimError)
     condition = TrimCondition(airspeed, climb_rate, sideslip, turn_rate)
@@ -98,16 +108,44 @@ def solve_trim(
     checks.choice("method", method, METHODS, TrimError)
     if method == "two_loop" and (aircraft.drives or aircraft.body.is_stand):
         raise TrimError(f"method = 'two_loop': allowed {'with drives' if aircraft.drives else 'on a stand'} is newton")
+    if aircraft.body.is_stand and has_two_blades(aircraft):
+        raise TrimError("body.stand: allowed with two blades is none; IsolatedRotor holds the hub of a rotor")
     if aircraft.body.is_stand:
         return rest(aircraft, condition, fidelity, _rest_guess(guess))
-    problem = TrimProblem(aircraft, fidelity)
-    start = None if guess is None else _start(problem, condition, checked_guess(aircraft, guess))
+    if has_two_blades(aircraft):
+        Period(aircraft, fidelity)  # before the search: raises where there is none
+    problem = TrimProblem(substitute(aircraft), fidelity)
+    start = (
+        None if guess is None else _start(problem, condition, _of_substitute(aircraft, checked_guess(aircraft, guess)))
+    )
     if method == "two_loop":
         start = MomentumTheory(problem).guess(condition) if start is None else start
         unknowns, outer, inner = solve_by_two_loops(problem, condition, start)
-        return problem.point(condition, unknowns, method, outer, inner)
+        return _own(aircraft, problem.point(condition, unknowns, method, outer, inner))
     unknowns, iterations = find(problem, condition, start)
-    return problem.point(condition, unknowns, method, iterations)
+    return _own(aircraft, problem.point(condition, unknowns, method, iterations))
+
+
+def _own(aircraft: Aircraft, point: TrimPoint) -> TrimPoint:
+    """Trim of an aircraft, of that of its substitute; with two blades the periodic flight near it."""
+    if not has_two_blades(aircraft):
+        return point
+    unequal = [rotor for rotor in aircraft.rotors if rotor.blades == 2 and not rotor.has_equal_blades]
+    point = replace(point, warnings=(*point.warnings, *(f"{rotor.name}: {UNEQUAL_BLADES}" for rotor in unequal)))
+    return periodic(aircraft, with_two_blades(aircraft, point))
+
+
+def _of_substitute(
+    aircraft: Aircraft, guess: TrimPoint | tuple[Array, Array | None]
+) -> TrimPoint | tuple[Array, Array | None]:
+    """Checked guess for the substitute of an aircraft."""
+    if isinstance(guess, TrimPoint):
+        return trim_of_substitute(aircraft, guess) if has_two_blades(aircraft) else guess
+    controls, state = guess
+    if state is None or not has_two_blades(aircraft):
+        return guess
+    speeds = aircraft.rotor_speeds(aircraft.layout.from_linear(state))
+    return controls, of_substitute(aircraft, state, speeds)
 
 
 def _rest_guess(guess: Guess | None) -> StandPoint | None:

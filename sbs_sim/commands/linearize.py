@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from sbs_sim.analysis.floquet import Floquet
     from sbs_sim.analysis.linear_model import LinearModel
     from sbs_sim.analysis.modes import Mode
+    from sbs_sim.flight.trim_point import TrimPoint
 
 LEADING = 3  # states named beside a mode
 MIN_SHARE = 0.005  # of the participations that are listed
@@ -80,6 +81,7 @@ def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.analysis.linear_model import growing_rotor_modes_text
     from sbs_sim.analysis.linearize import linearize_trim
     from sbs_sim.analysis.trim import solve_trim
+    from sbs_sim.flight.two_blades import has_two_blades
     from sbs_sim.output.files import check_target, write
     from sbs_sim.output.json_text import to_json
 
@@ -87,6 +89,12 @@ def _work(arguments: argparse.Namespace) -> None:
     check_target(arguments.json)
     craft = aircraft(arguments)
     point = solve_trim(craft, *flight(arguments), guess=guess(arguments, craft))
+    wants_model = (
+        arguments.out or arguments.json or arguments.participation or arguments.derivatives or arguments.matrices
+    )
+    if arguments.floquet and has_two_blades(craft) and not wants_model:  # there is no other linear model
+        _print_exponents(craft, point)
+        return
     full = linearize_trim(craft, point, method=arguments.method)
     model = full.quasi_static() if arguments.quasi_static else full
     _print_model(craft, model)
@@ -158,12 +166,35 @@ def _print_participation(model: "LinearModel") -> None:
         print(f"{mode.name.ljust(width)}  {', '.join(f'{name} {share:.1%}' for name, share in _shares(model, mode))}")
 
 
+def _print_exponents(craft: "Aircraft", point: "TrimPoint") -> None:
+    """Characteristic exponents of a periodic flight with two blades."""
+    from sbs_sim.analysis.floquet import floquet
+
+    found = floquet(craft, point, MIN_INSTANTS)
+    found = floquet(craft, point, _instants(found.period, found.poles))
+    print_heading("periodic flight", craft, point)
+    print(f"\nFloquet: period {found.period * 1e3:.4g} ms, no constant model; exponents are known but for multiples of")
+    print(f"{2.0 * math.pi / found.period:.5g} rad/s [rad/s]")
+    rows = [
+        [*pole_cells(exponent), f"{abs(multiplier):.6g}"]
+        for exponent, multiplier in zip(found.exponents, found.multipliers, strict=True)
+        if exponent.imag >= 0.0
+    ]
+    print_table(["exponent", "", "|multiplier|"], rows)
+    print_limits(point)
+
+
 def _azimuth_count(craft: "Aircraft", model: "LinearModel") -> int:
     """Instants of a period that the fastest mode needs: rotors of unequal speeds may have a long common period."""
-    from sbs_sim.analysis.floquet import AZIMUTH_COUNTS, common_period
+    from sbs_sim.analysis.periodic import common_period
 
-    period, _ = common_period(craft)
-    steps = math.ceil(period * abs(model.poles[-1]) / MAX_STEP)
+    return _instants(common_period(craft)[0], model.poles)
+
+
+def _instants(period: float, poles: "NDArray[np.complex128]") -> int:
+    from sbs_sim.analysis.floquet import AZIMUTH_COUNTS
+
+    steps = math.ceil(period * abs(poles[-1]) / MAX_STEP)
     return min(max(MIN_INSTANTS, 2 * steps), AZIMUTH_COUNTS[1])  # two instants make a step
 
 

@@ -52,7 +52,7 @@ def make_parser() -> Parser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    from sbs_sim.analysis.linearize import linearize_trim
+    from sbs_sim.analysis.linearize import trim_effects
     from sbs_sim.analysis.trim import solve_trim
     from sbs_sim.output.files import check_target, write
     from sbs_sim.output.json_text import to_json
@@ -60,7 +60,7 @@ def _work(arguments: argparse.Namespace) -> None:
     check_target(arguments.json)
     craft = aircraft(arguments)
     point = solve_trim(craft, *flight(arguments), method=arguments.method, guess=guess(arguments, craft))
-    print_trim(craft, point, linearize_trim(craft, point).control_effects)
+    print_trim(craft, point, trim_effects(craft, point))
     if arguments.json:
         write(arguments.json, to_json(point.to_dict()))
 

@@ -74,6 +74,8 @@ def _blocks(aircraft: "Aircraft") -> list[list[int]]:
         for n in range(1, S.harmonic_count(rotor.blades) + 1):
             block = [part + i for part in parts for i in (2 * n - 1, 2 * n)]
             found.append([*block, inflow + 1, inflow + 2] if n == 1 else block)
+        if rotor.blades == 2:
+            found.append([inflow + 1, inflow + 2])
         if rotor.blades % 2 == 0:
             found.append([part + rotor.blades - 1 for part in parts])
     return found

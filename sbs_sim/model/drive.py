@@ -43,6 +43,7 @@ from sbs_sim.model.dynamics import (
 )
 from sbs_sim.model.frames import shaft_down
 from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.teeter import hold_coning, lock_coning
 
 NONE, ENGINE, ELECTRIC = range(3)  # kinds of engines
 SPEEDS, AZIMUTHS, ACCELERATIONS = range(3)  # of `Work.turning`
@@ -90,6 +91,8 @@ def driven_derivative(model, x, swash, psi, wind, work, dx, with_loads):
     commands = as_lanes(swash, like)
     loads = set_known_loads(aircraft, memory, flight, commands, turning[AZIMUTHS])
     loads = transmission_loads(memory.state, drives, flight, loads)
+    if aircraft.switches[0].teetering == 1:
+        lock_coning(aircraft, memory)
     for i in range(drives.shape[0]):
         set_drive_rates(memory.state, drives[i], shafts[i], commands, out)
         eliminate(aircraft, memory, drives, i, shafts[i])
@@ -97,6 +100,8 @@ def driven_derivative(model, x, swash, psi, wind, work, dx, with_loads):
     solve_blades(aircraft, memory)
     solve_shafts(aircraft, memory, drives, shafts, turning, out)
     turn_blades(aircraft, memory, turning)
+    if aircraft.switches[0].teetering == 1:
+        hold_coning(aircraft, memory)
     if with_loads:
         set_hub_loads(aircraft, memory)
         add_shaft_loads(aircraft, memory, turning)

@@ -54,6 +54,7 @@ from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
 from sbs_sim.model.section import section_loads
 from sbs_sim.model.surfaces import fuselage_load, rotor_wash, surface_load
+from sbs_sim.model.teeter import hold_coning, lock_coning
 from sbs_sim.model.trigonometry import cosine_sine
 
 
@@ -90,6 +91,8 @@ class Memory(NamedTuple):
     strip: Any
     loads: Any
     span: Any
+    coning: Any
+    coning_change: Any
 
 
 class Flight(NamedTuple):
@@ -188,6 +191,8 @@ def memory_in_lanes(work):
         strip=as_records(work.strip),
         loads=as_records(work.loads),
         span=work.span,
+        coning=as_records(work.coning),
+        coning_change=as_lanes(work.coning_change, sums),
     )
 
 
@@ -197,8 +202,12 @@ def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
     flight = body_motion(aircraft, memory.state, wind)
     loads = set_known_loads(aircraft, memory, flight, swash, psi)
     if aircraft.switches[0].complete_coupling == 1:
+        if aircraft.switches[0].teetering == 1:
+            lock_coning(aircraft, memory)
         solve_coupled_body(aircraft, memory, flight, loads)
         solve_blades(aircraft, memory)
+        if aircraft.switches[0].teetering == 1:
+            hold_coning(aircraft, memory)
         if with_loads:
             set_hub_loads(aircraft, memory)
     else:

@@ -1,4 +1,4 @@
-"""Multiblade (Coleman) coordinates of a rotor with three or more blades (theory.md section 1).
+"""Multiblade (Coleman) coordinates of a rotor (theory.md section 1).
 
 beta_k = a0 - sum_n (a_n cos n psi_k + b_n sin n psi_k) + a_d (-1)^k, n = 1 .. (N_b - 1) / 2, with the differential
 coordinate a_d for even N_b only: N_b coordinates for N_b blades, one to one. Lag alike.

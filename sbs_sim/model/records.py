@@ -43,6 +43,7 @@ SWITCHES = {
     "axial_dampers": INTEGER,  # 1 where a rotor has them
     "stand": INTEGER,
     "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
+    "teetering": INTEGER,  # 1 where a rotor is
 }
 ROTOR = {
     "rotor_speed": LANES,  # Omega; 0 where a drive turns the rotor, whose speed is a state
@@ -62,6 +63,8 @@ ROTOR = {
     "inverse_tip_speed": LANES,
     "coefficient_scale": LANES,  # of C_T: 1 / (rho pi R^2 (Omega R)^2), 0 in vacuum
     "inverse_blades": LANES,  # 1 / N_b
+    "flap_rest": LANES,  # the coning of a teetering rotor
+    "teetering": INTEGER,
     "blades": INTEGER,  # N_b
     "harmonics": INTEGER,
     "first_quad": INTEGER,
@@ -201,6 +204,8 @@ SUMS = {
     "hinge_inertia": (6,),
 }
 HARMONIC = {"flap_cosine": LANES, "flap_sine": LANES, "lag_cosine": LANES, "lag_sine": LANES}
+# of a teetering rotor: the sums of c_beta, of c_beta / A_1 and of Q_beta / A_1
+CONING = {"force": VECTOR, "moment": VECTOR, "force_share": VECTOR, "moment_share": VECTOR, "flap": LANES}
 MEANS = {"flap": LANES, "lag": LANES, "flap_differential": LANES, "lag_differential": LANES}
 # loads on the hub without those of the locked blades, about the c.g., and the moment in the paper's reading
 HUB = {"force": VECTOR, "moment": VECTOR, "paper_moment": VECTOR}
@@ -358,6 +363,9 @@ class Work(NamedTuple):
     turning : ndarray, shape (3, n_rotors, n)
         There speeds [rad/s], azimuths [rad] and angular accelerations [rad/s^2] of the rotors.
     shafts : structured ndarray, shape (n_drives,)
+    coning : structured ndarray, shape (quads,)
+        Of an aircraft with teetering rotors, else empty, as the next.
+    coning_change : ndarray, shape (n_rotors, n)
     """
 
     state: Array
@@ -378,6 +386,8 @@ class Work(NamedTuple):
     turning_blades: NDArray[Any]
     turning: Array
     shafts: NDArray[Any]
+    coning: NDArray[Any]
+    coning_change: Array
 
 
 def state_size(model: Model) -> int:
@@ -395,7 +405,7 @@ def make_work(model: Model) -> Work:
     size = state_size(model)
     acceleration_rows = aligned((6, n), float)
     load_rows = aligned((LOAD_SIZE * len(rotors), n), float)
-    turning = len(model.drives) > 0
+    turning, teetering = len(model.drives) > 0, bool(model.switches["teetering"][0])
     return Work(
         state=aligned((size + 1, n), float),
         terms=records(TERMS, len(model.blades), width),
@@ -415,6 +425,8 @@ def make_work(model: Model) -> Work:
         turning_blades=_copied(model.blades if turning else model.blades[:0]),
         turning=aligned((3, len(rotors) if turning else 0, n), float),
         shafts=records(SHAFT, len(model.drives), n),
+        coning=records(CONING, quads if teetering else 0, n),
+        coning_change=aligned((len(rotors) if teetering else 0, n), float),
     )
 
 

@@ -72,16 +72,17 @@ def multiblade_suffixes(blades: int) -> tuple[str, ...]:
     Parameters
     ----------
     blades : int
-        Number of blades, at least 3.
+        Number of blades, at least 2.
 
     Returns
     -------
     tuple of str, length `blades`
-        ("0", "c", "s") for three blades, then ("2c", "2s"), ... and "d" last for an even number.
+        "0", then ("c", "s"), ("2c", "2s"), ... and "d" last for an even number: ("0", "d") for two blades.
     """
-    names = ["0", "c", "s"]
-    for harmonic in range(2, harmonic_count(blades) + 1):
-        names += [f"{harmonic}c", f"{harmonic}s"]
+    names = ["0"]
+    for harmonic in range(1, harmonic_count(blades) + 1):
+        order = "" if harmonic == 1 else str(harmonic)
+        names += [f"{order}c", f"{order}s"]
     return tuple(names + ["d"] if blades % 2 == 0 else names)
 
 

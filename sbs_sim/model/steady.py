@@ -19,6 +19,7 @@ from sbs_sim.model.dynamics import (
 )
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.state import set_vector
+from sbs_sim.model.teeter import hold_coning
 
 
 @entry
@@ -54,6 +55,8 @@ def steady_balance(model, x, swash, psi, wind, work, dx, imbalance):
     set_acceleration(memory, steady, Vector(0.0, 0.0, 0.0))
     if aircraft.switches[0].complete_coupling == 1:
         solve_blades(aircraft, memory)
+        if aircraft.switches[0].teetering == 1:
+            hold_coning(aircraft, memory)
     else:
         solve_blades_alone(aircraft, memory)
     set_body_rates(memory, flight, rates)
@@ -71,6 +74,8 @@ def hold_coordinates(aircraft, memory):
     indices = aircraft.indices
     for r in range(aircraft.blades.shape[0]):
         blade, terms = aircraft.blades[r], memory.terms[r]
+        if blade.harmonics == 0:  # two blades move with their own accelerations
+            continue
         flap = steady_acceleration(memory.state, indices.flap, blade, terms)
         lag = steady_acceleration(memory.state, indices.lag, blade, terms)
         terms.flap_acceleration, terms.lag_acceleration = flap, lag * blade.lead_lag

@@ -25,7 +25,8 @@ from viser import ViserServer
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, LinearModel, RotorStateArray, SimulationStatus
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
-from sbs_sim.analysis.linearize import linearize
+from sbs_sim.analysis.linearize import trim_effects
+from sbs_sim.analysis.trim import trim
 from sbs_sim.cockpit.access import access_check
 from sbs_sim.cockpit.poles import Pole
 from sbs_sim.cockpit.readouts import Status
@@ -184,7 +185,7 @@ class Cockpit(Component):
     def _effects(self, aircraft: Aircraft) -> tuple[ControlEffect, ...]:
         """What the controls of an aircraft do in hover; nothing for one that has no hover."""
         try:
-            return linearize(aircraft).control_effects
+            return trim_effects(aircraft, trim(aircraft))
         except SbsError as error:
             self.get_logger().warning(f"the effects of the keys on {aircraft.name} are unknown: {error}")
             return ()

@@ -10,8 +10,9 @@ from scipy.linalg import expm
 
 from sbs_sim import linearize, trim
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.floquet import Floquet, _beside, common_period, floquet, transition
+from sbs_sim.analysis.floquet import Floquet, _beside, floquet, transition
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
+from sbs_sim.analysis.periodic import common_period
 from sbs_sim.analysis.validation.hammond import multipliers_of_equations
 from sbs_sim.errors import LinearizationError, TrimError
 from sbs_sim.flight.trim_point import Fidelity

@@ -247,6 +247,65 @@ def test_tables_along_the_blade(sbs):
     assert [own.chord_values[1] for own in changed.rotors] == [0.07, 0.06]
 
 
+def without_blade_mass(rotor):
+    return {key: value for key, value in rotor.items() if key not in ("blade_mass", "blade_cg", "blade_inertia")}
+
+
+HINGE, LENGTH = 0.075, 0.43  # m, of sbs
+# Mass per length m(s) over s = 0 at the flap hinge to L, and its integrals [kg, kg m, kg m^2].
+DISTRIBUTIONS = {
+    "uniform": ({"stations": [0.0, 1.0], "values": [0.4, 0.4]}, [0.4 * LENGTH ** (n + 1) / (n + 1) for n in range(3)]),
+    "uniform, given between two stations only": (
+        {"stations": [0.5, 0.6], "values": [0.4, 0.4]},
+        [0.4 * LENGTH ** (n + 1) / (n + 1) for n in range(3)],
+    ),
+    "tapered to nothing": (  # m = 0.8 (1 - s / L)
+        {"stations": [HINGE / 0.505, 1.0], "values": [0.8, 0.0]},
+        [0.8 * LENGTH ** (n + 1) / ((n + 1) * (n + 2)) for n in range(3)],
+    ),
+    "tip mass": (
+        {"stations": [0.0, 1.0], "values": [0.0, 0.0], "tip_mass": 0.05},
+        [0.05 * LENGTH**n for n in range(3)],
+    ),
+    "uniform with a tip mass": (
+        {"stations": [0.0, 1.0], "values": [0.4, 0.4], "tip_mass": 0.05},
+        [0.4 * LENGTH ** (n + 1) / (n + 1) + 0.05 * LENGTH**n for n in range(3)],
+    ),
+    "steps, and a root that does not flap": (
+        {"stations": [0.0, 0.1, 0.1, 0.5, 0.5, 1.0], "values": [90.0, 90.0, 0.5, 0.5, 0.3, 0.3]},
+        [
+            (0.5 * (0.2525 - HINGE) ** (n + 1) + 0.3 * (LENGTH ** (n + 1) - (0.2525 - HINGE) ** (n + 1))) / (n + 1)
+            for n in range(3)
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", DISTRIBUTIONS)
+def test_integrals_of_a_distributed_mass(sbs, case):
+    table, (mass, first, second) = DISTRIBUTIONS[case]
+    aircraft = sbs.with_value("rotors.mass_distribution", table)
+    rotor = aircraft.rotors[0]
+    assert rotor.blade_mass == pytest.approx(mass, rel=1e-14)
+    assert (rotor.first_moment, rotor.second_moment) == pytest.approx((first, second), rel=1e-14)
+    given = {"blade_mass": rotor.blade_mass, "blade_cg": rotor.blade_cg, "blade_inertia": rotor.blade_inertia}
+    if rotor.first_moment * rotor.blade_cg <= second:  # a point has equal sides, but for rounding
+        integrals = sbs.with_values({f"rotors.{key}": value for key, value in given.items()})
+        assert integrals.parameter_hash == aircraft.parameter_hash
+        assert model_arrays(integrals) == model_arrays(aircraft)
+
+
+def test_a_distributed_mass_takes_the_place_of_its_integrals(sbs):
+    """Of every rotor or of one; its stations may then be changed, and move with the radius."""
+    table = {"stations": [0.0, 1.0], "values": [0.4, 0.4]}
+    one = sbs.with_value("rotors.MR2.mass_distribution", table)
+    assert [rotor.blade_mass for rotor in one.rotors] == [0.1613, pytest.approx(0.172)]
+    short = one.with_values({"rotors.MR2.mass_distribution.values[1]": 0.0, "rotors[1].radius": 0.405})
+    inner, length = 0.4 * 0.33 / 0.405, 0.33  # 0.4 (1 - r / R) at the hinge
+    assert short.rotors[1].blade_mass == pytest.approx(inner * length / 2)
+    assert Aircraft.from_dict(one.data).parameter_hash == one.parameter_hash
+
+
 def test_mass_first_moment_and_inertia_of_a_blade_are_independent(sbs):
     """UH-60A after Howlett, NASA CR-166309: no uniform blade has these three."""
     blade = {"mass": 116.527879853, "first_moment": 385.66081570248, "inertia": 2050.8103068}
@@ -318,7 +377,7 @@ def schema_leaves(schema, path=()):
 
 
 # in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py
-ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage")
+ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage", "flap_hinge")
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)
@@ -357,6 +416,7 @@ OPTIONAL = {
     "duct",
     "stations",
     "values",
+    "tip_mass",
 }
 NOT_IN_THE_MODEL = {
     "name",
@@ -433,9 +493,12 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
         data["rotors"][0]["duct"] = {"exit_area": 0.9}
         aircraft, value = Aircraft.from_dict(data), 0.9
         everything, arrays = flattened(aircraft), model_arrays(aircraft)
-    if path[-1] in ("stations", "values"):
+    if path[-1] in ("stations", "values", "tip_mass"):
         values = ["linear_573", "naca0012"] * 2 if path[2] == "outboard_airfoils" else [0.05, 0.04, 0.03]
         data["rotors"][0][path[2]] = {"stations": [0.2, 0.6, 1.0], "values": values[:3]}
+        if path[2] == "mass_distribution":
+            data["rotors"][0] = without_blade_mass(data["rotors"][0])
+            data["rotors"][0][path[2]]["tip_mass"] = 0.001
         aircraft, value = Aircraft.from_dict(data), get(data, path)
         everything, arrays = flattened(aircraft), model_arrays(aircraft)
     put(data, path, other_value(path, value))
@@ -555,8 +618,8 @@ REFUSED = {
         0.5,
         "rotors[1].root_cutout = 0.5: allowed is < 0.43, from the flap hinge to the tip",
     ),
-    "no blades": ((*R0, "blades"), 0, "rotors[0].blades = 0: allowed is >= 3"),
-    "two blades": ((*R0, "blades"), 2, "rotors[0].blades = 2: allowed is >= 3"),
+    "no blades": ((*R0, "blades"), 0, "rotors[0].blades = 0: allowed is >= 2"),
+    "one blade": ((*R0, "blades"), 1, "rotors[0].blades = 1: allowed is >= 2"),
     "three and a half blades": ((*R0, "blades"), 3.5, "rotors[0].blades = 3.5: allowed is an integer"),
     "blade whose mass is too far out": (
         (*R0, "blade_cg"),
@@ -615,6 +678,27 @@ REFUSED = {
         (*R0, "duct"),
         {"turning": 0.5},
         "rotors[0].duct.exit_area: missing; allowed is 0.25 to 4",
+    ),
+    "a distributed mass beside its integral": (
+        (*R0, "mass_distribution"),
+        {"stations": [0.0, 1.0], "values": [0.4, 0.4]},
+        "rotors[0].blade_cg = 0.224: allowed is to leave the key out where the rotor has mass_distribution; "
+        "rotors[0].blade_mass = 0.1613: allowed is to leave the key out where the rotor has mass_distribution",
+    ),
+    "a distribution without mass": (
+        R0,
+        {**without_blade_mass(sbs_data()["rotors"][0]), "mass_distribution": {"stations": [0, 1], "values": [0, 0]}},
+        "rotors[0].mass_distribution.values = [0.0, 0.0]: allowed is some mass between flap hinge and tip",
+    ),
+    "only a tip mass": (
+        R0,
+        {**without_blade_mass(sbs_data()["rotors"][0]), "mass_distribution": {"tip_mass": 0.1}},
+        "rotors[0].mass_distribution.stations: missing key",
+    ),
+    "stations of mass out of order": (
+        R0,
+        {**without_blade_mass(sbs_data()["rotors"][0]), "mass_distribution": {"stations": [1, 0.5], "values": [1, 1]}},
+        "rotors[0].mass_distribution.stations = [1.0, 0.5]: allowed are numbers in order",
     ),
     "damper without a length": (
         (*R0, "lag_damper"),
@@ -699,8 +783,8 @@ def test_a_bad_value_is_refused_in_one_line(path, value, line):
 def test_all_that_is_wrong_is_said_once():
     data = sbs_data()
     del data["body"]["mass"], data["body"]["inertia"]
-    data["rotors"][1]["blades"] = 2
-    assert refusal(data) == "body.inertia, body.mass: missing key; rotors[1].blades = 2: allowed is >= 3"
+    data["rotors"][1]["blades"] = 1
+    assert refusal(data) == "body.inertia, body.mass: missing key; rotors[1].blades = 1: allowed is >= 2"
     data = sbs_data()
     data["rotors"][0]["hinge_offset"] = 0.6
     data["rotors"][1]["name"] = "MR1"

@@ -49,7 +49,7 @@ def test_the_schema_has_types_and_ranges():
     rotor = schema["properties"]["rotors"]["items"]["properties"]
     assert rotor["lag_damping"] == {"type": "number", "minimum": 0, "maximum": 1e9}
     assert rotor["tip_loss"] == {"type": "number", "exclusiveMinimum": 0, "maximum": 1}
-    assert rotor["blades"] == {"type": "integer", "minimum": 3, "maximum": 20}
+    assert rotor["blades"] == {"type": "integer", "minimum": 2, "maximum": 20}
     assert rotor["rotation"] == {"enum": [1, -1]}
     assert rotor["name"] == {"type": "string", "minLength": 1}
     hundred = {"type": "number", "minimum": -100, "maximum": 100}

@@ -132,8 +132,10 @@ ALLOWED = {
     "sbs_sim.validation": ["sbs_sim.checks"],
     "sbs_sim.aircraft.declaration": [],
     "sbs_sim.aircraft.atmosphere": ["sbs_sim.model"],
+    "sbs_sim.aircraft.blade_mass": [],
     "sbs_sim.aircraft.description": [
         "sbs_sim.aircraft.atmosphere",
+        "sbs_sim.aircraft.blade_mass",
         "sbs_sim.aircraft.declaration",
         "sbs_sim.content",
         "sbs_sim.model",

@@ -86,9 +86,9 @@ def test_blade_accelerations_follow_lagrange(coupling, flap_inertia, lead_lag):
 
 
 def test_blade_accelerations_follow_lagrange_for_other_blade_counts():
-    """Four and five blades, whose multiblade transforms have more than three coordinates."""
+    """Two blades, and four, five and six, whose multiblade transforms have more than three coordinates."""
     rng = np.random.default_rng(8)
-    for blades in ([4, 5], [3, 6]):
+    for blades in ([4, 5], [3, 6], [2, 2]):
         assert largest_error(odd_aircraft(rng, blades=blades), rng) < TOLERANCE
 
 

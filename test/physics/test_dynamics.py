@@ -121,8 +121,18 @@ STANDS = {
     "mixed": {"free": ["x", "pitch", "yaw"], "mass": [30.0, 0, 0, 0, 4.0, 2.0], "spring": [900.0, 0, 0, 0, 8.0, 0]},
     "locked": {"free": []},
 }
+TEETERING = {
+    **ODD_BLADE,
+    "blades": 2,
+    "hinge_offset": 0.0,
+    "flap_hinge_offset": 0.0,
+    "flap_hinge": "teetering",
+}
 AIRCRAFT = {
     "sbs": {},
+    "teetering": {"every_rotor": TEETERING, "rotors": TILTED},
+    "one_teeters": {"every_rotor": ODD_BLADE, "rotors": [TEETERING, {"blades": 3}]},
+    "teetering_on_a_stand": {"every_rotor": TEETERING, "rotors": TILTED, "body": {"stand": STANDS["mixed"]}},
     "sbs_paper": {"name": "sbs_paper"},
     "paper_coupling_only": {"options": {"coupling": "paper"}},
     "paper_and_odd_blades": {"name": "sbs_paper", "every_rotor": ODD_BLADE, "rotors": TILTED},
@@ -136,6 +146,8 @@ AIRCRAFT = {
     },
     "one_duct": {"rotors": [{"duct": {"exit_area": 1.1}}, {"duct_expansion": 0.7}]},
     "four_and_five_blades": {"rotors": [{"blades": 4}, {"blades": 5}], "every_rotor": ODD_BLADE},
+    "two_and_three_blades": {"rotors": [{"blades": 2}, {"blades": 3}], "every_rotor": ODD_BLADE},
+    "two_blades": {"every_rotor": {**ODD_BLADE, "blades": 2}, "rotors": TILTED},
     "seven_and_twelve_blades": {
         "every_rotor": {"blade_mass": 0.05},
         "rotors": [{"blades": 7}, {"blades": 12}],

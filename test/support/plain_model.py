@@ -103,7 +103,7 @@ def multiblade_matrix(blades, psi, derivative=0):
     Parameters
     ----------
     blades : int
-        Number of blades N_b, 3 or more.
+        Number of blades N_b, 2 or more.
     psi : float
         Azimuth of blade 1 [rad].
     derivative : {0, 1, 2}
@@ -598,6 +598,7 @@ class Instant(NamedTuple):
     pitches: list  # over rotors, over blades, of pairs: pitch at the hinge [rad] and its rate [rad/s]
     state: object  # `split_state`
     hub_velocities: list  # over rotors, relative to the air, body axes [m/s]
+    conings: list  # over rotors, of pairs: mean flap angle [rad] and rate [rad/s]
 
 
 def unpack(instant, unknowns):
@@ -804,7 +805,12 @@ def residual(instant, unknowns):
             hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd[j][k], lag_dd[j][k])
             for k in range(rotor.blades)
         ]
-        hinges += [flap for flap, _ in pairs]
+        if getattr(rotor, "flap_hinge", "each") == "teetering":  # one hinge: equal and opposite, and the coning given
+            speed, (coning, rate) = inflow_speed(rotor), instant.conings[j]
+            wanted = speed**2 * (rotor.flap_rest - coning) - 2 * speed * rate
+            hinges += [pairs[0][0] - pairs[1][0], (flap_dd[j][0] + flap_dd[j][1]) / 2 - wanted]
+        else:
+            hinges += [flap for flap, _ in pairs]
         if instant.lead_lag:
             hinges += [lag for _, lag in pairs]
     if stands(ac):
@@ -868,6 +874,7 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
         pitches=[[hinge_pitch(blade, swash[j]) for blade in own] for j, own in enumerate(blades)],
         state=state,
         hub_velocities=hub_velocities,
+        conings=[(flap[0], rate[0]) for flap, rate in zip(state.flap, state.flap_rate, strict=True)],
     )
 
 

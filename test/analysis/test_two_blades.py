@@ -1,0 +1,248 @@
+"""Rotors with two blades: periodic flight, Floquet's exponents about it, and rotors alone (theory.md section 8.6)."""
+
+import math
+
+import numpy as np
+import pytest
+from helpers import WEIGHTLESS_VACUUM, aircraft_data, build, linear_airfoil
+
+from sbs_sim import linearize, simulate, sweep, trim
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.floquet import floquet
+from sbs_sim.analysis.isolated_rotor import IsolatedRotor
+from sbs_sim.analysis.linearize import trim_effects
+from sbs_sim.errors import AircraftError, LinearizationError, TrimError
+from sbs_sim.flight.trim_point import Fidelity
+from sbs_sim.flight.trimmed_state import trimmed_state
+from sbs_sim.flight.two_blades import substitute, trim_of_substitute
+from sbs_sim.model import state as S
+
+BLADES = 3  # of sbs, which together are two
+
+
+def heavier(blades, **more):
+    """Blades of sbs with the mass, springs, dampers and area of its three blades in all."""
+    share = BLADES / blades
+    values = {"blade_mass": 0.1613, "flap_spring": 162.0, "lag_spring": 0.0, "lag_damping": 0.022}
+    chord = {"root": 0.051 * share, "tip": 0.051 * share}
+    return {key: value * share for key, value in values.items()} | {"blades": blades, "chord": chord, **more}
+
+
+@pytest.fixture(scope="module")
+def two():
+    return build(every_rotor=heavier(2))
+
+
+@pytest.fixture(scope="module")
+def cruise(two):
+    return trim(two, 12.0, turn_rate=0.2)
+
+
+def test_a_trim_is_a_flight_that_repeats(two, cruise):
+    """Forty revolutions later the body is as it was, and it has gone the wanted way."""
+    period = 2 * math.pi / two.rotors[0].speed
+    flight = simulate(two, cruise, cruise.controls, 40 * period, tick=period, azimuth_step=math.radians(5))
+    begin, end = flight["state"][0], flight["state"][-1]
+    np.testing.assert_allclose(end[S.VELOCITY : S.BODY_SIZE], begin[S.VELOCITY : S.BODY_SIZE], atol=1e-4)
+    np.testing.assert_allclose(end[S.BODY_SIZE :], begin[S.BODY_SIZE :], rtol=1e-4, atol=1e-4)
+    turned = 0.2 * 40 * period
+    way = 12.0 / 0.2 * np.array([math.sin(turned), 1 - math.cos(turned), 0.0])
+    np.testing.assert_allclose(end[:3], way, atol=1e-3)
+    assert cruise.residual < 1e-9
+
+
+def test_the_methods_of_integration_agree(two, cruise):
+    """Each state of a rotor with two blades is in one of the blocks of the exponential method."""
+    ends = [
+        simulate(two, cruise, cruise.controls + 0.01, 0.5, method=method, azimuth_step=math.radians(4))["state"][-1]
+        for method in ("etd", "rk4")
+    ]
+    np.testing.assert_allclose(*ends, rtol=1e-5, atol=1e-6)
+
+
+def test_three_lighter_blades_trim_alike(tmp_path):
+    """In hover nothing vibrates: the number of blades of the same mass and area does not count."""
+    airfoil = linear_airfoil(tmp_path / "linear.csv")
+    points = [trim(build(every_rotor=heavier(blades, airfoil=airfoil))) for blades in (2, 3, 4)]
+    for other in points[1:]:
+        np.testing.assert_allclose(other.controls, points[0].controls, atol=1e-9)
+        np.testing.assert_allclose(other.power, points[0].power, rtol=1e-9)
+        assert other["a0(1)"] == pytest.approx(points[0]["a0(1)"], rel=1e-9)
+
+
+def test_two_rotors_of_two_blades_are_one_of_four(tmp_path):
+    """The thrust of a rotor alone in hover, whose blades have half the mass and area."""
+    airfoil = linear_airfoil(tmp_path / "linear.csv")
+    found = [
+        IsolatedRotor(build(rotors=[heavier(blades, airfoil=airfoil)])).steady((0.14, 0.0, 0.0)) for blades in (2, 4)
+    ]
+    assert found[0].thrust == pytest.approx(found[1].thrust, rel=1e-9)
+    assert found[0].torque == pytest.approx(found[1].torque, rel=1e-9)
+    assert found[0].residual < 1e-9
+
+
+def test_loads_of_a_rotor_alone_are_those_of_its_motion(tmp_path):
+    """With cyclic pitch in a flow mean loads on the hub do not know of the number of blades.
+
+    But for cyclic inflow, which swings with the moment of two blades: it comes and goes twice per revolution.
+    """
+    airfoil, fidelity = linear_airfoil(tmp_path / "linear.csv"), Fidelity(cyclic_inflow=False)
+    rotors = [IsolatedRotor(build(rotors=[heavier(blades, airfoil=airfoil)]), fidelity) for blades in (2, 6)]
+    two, six = (rotor.steady((0.14, 0.01, 0.02), 15.0) for rotor in rotors)
+    assert two.thrust == pytest.approx(six.thrust, rel=1e-4)
+    np.testing.assert_allclose(two.force, six.force, atol=1e-4 * six.thrust)
+    np.testing.assert_allclose(two.moment, six.moment, atol=1e-3 * np.abs(six.moment).max())
+    again = rotors[0].steady((0.14, 0.01, 0.02), 15.0, start=two)
+    np.testing.assert_allclose(again.state, two.state, atol=1e-9)
+
+
+def test_exponents_in_a_vacuum_are_the_rotating_frequencies():
+    """Both blades flap and lag on their own: eqs. (3.5) and (3.6) without coning."""
+    aircraft = build(rotors=[heavier(2, lag_damping=0.0, lag_spring=30.0)], environment=WEIGHTLESS_VACUUM)
+    rotor, isolated = aircraft.rotors[0], IsolatedRotor(aircraft)
+    point = isolated.steady((0.0, 0.0, 0.0))
+    found = isolated.exponents(point, inflow=False)
+    s1, a1, e_0, e_f = rotor.first_moment, rotor.second_moment, rotor.hinge_offset, rotor.flap_hinge_offset
+    a2 = rotor.blade_mass * e_f**2 + 2 * e_f * s1 + a1
+    flap = math.sqrt(1 + e_0 * s1 / a1 + rotor.flap_spring / (a1 * rotor.speed**2))
+    lag = math.sqrt((e_0 - e_f) * (rotor.blade_mass * e_f + s1) / a2 + rotor.lag_spring / (a2 * rotor.speed**2))
+    expected = np.repeat([flap, lag], 2) * rotor.speed
+    principal = np.abs(np.angle(np.exp(1j * expected * 2 * math.pi / rotor.speed))) * rotor.speed / (2 * math.pi)
+    np.testing.assert_allclose(np.sort(found.imag[found.imag > 0]), np.sort(principal), rtol=1e-5)
+    np.testing.assert_allclose(found.real, 0.0, atol=1e-4 * rotor.speed)
+
+
+def test_floquet_is_the_departure_of_a_flight_in_a_period(two, cruise):
+    """Columns of the monodromy matrix against the nonlinear flight, by another method of integration."""
+    found = floquet(two, cruise, 96)
+    start, names = trimmed_state(two, cruise), cruise.state_names
+    for name, step in (("ad(1)", 1e-4), ("dxi0(2)", 1e-2), ("q", 1e-4), ("lambdac(1)", 1e-5), ("w", 1e-3)):
+        ends = []
+        for sign in (1, -1):
+            linear = cruise.state.copy()
+            linear[names.index(name)] += sign * step
+            state = two.layout.from_linear(linear)
+            flight = simulate(
+                two, state, cruise.controls, found.period, tick=found.period, azimuth_step=math.radians(2), method="rk4"
+            )
+            ends.append(two.layout.to_linear(flight["state"][-1]))
+        column = (ends[0] - ends[1]) / (2 * step)
+        size = np.abs(column).max()
+        np.testing.assert_allclose(found.monodromy[:, names.index(name)], column, atol=2e-3 * size)
+    assert len(start) == two.layout.size
+
+
+def test_a_guess_leads_to_its_trim(two, cruise):
+    for guess in (cruise, (cruise.controls, cruise.state)):
+        again = trim(two, 12.0, turn_rate=0.2, guess=guess)
+        np.testing.assert_allclose(again.state, cruise.state, atol=1e-8)
+
+
+def test_the_substitute_has_the_same_loads(two, cruise):
+    """Mean thrust and torque of the periodic flight and of constant coordinates differ by the vibration only."""
+    lighter = substitute(two)
+    assert lighter.fuselage()[0] == pytest.approx(two.fuselage()[0], rel=1e-12)
+    np.testing.assert_allclose(lighter.fuselage()[2], two.fuselage()[2], atol=1e-12)
+    mean = trim(lighter, 12.0, turn_rate=0.2)
+    np.testing.assert_allclose(cruise.thrust, mean.thrust, rtol=2e-3)
+    np.testing.assert_allclose(cruise.power, mean.power, rtol=5e-3)
+    assert trim_of_substitute(two, cruise).state_names == mean.state_names
+
+
+def test_rotors_of_two_and_more_blades_and_speeds():
+    """A common period of three revolutions of the first rotor, which is two of the other."""
+    rotors = [
+        heavier(2),
+        {"blades": 4, "blade_mass": 0.12, "speed_rpm": 1600.0, "radius": 0.7, "chord": {"root": 0.06, "tip": 0.06}},
+    ]
+    point = trim(build(rotors=rotors), 5.0, lead_lag=False)
+    assert point.residual < 1e-9
+    with pytest.raises(TrimError, match=r"rotors with two blades: the blade passages .* have no common period"):
+        trim(build(rotors=[heavier(2), {"speed_rpm": 2400.1}]))
+
+
+def test_there_is_no_constant_model(two, cruise):
+    says = "R1 has 2 blades: no constant model describes them; stability is that of Floquet's method"
+    with pytest.raises(LinearizationError, match=says):
+        linearize(two)
+    with pytest.raises(LinearizationError, match=says):
+        linearize(two, point=cruise)
+    found = sweep(two, "airspeed", [0.0, 5.0], workers=1)
+    assert [(point.model, point.error) for point in found.points] == [(None, None)] * 2
+    assert [effect.axis for effect in trim_effects(two, trim(two))] == ["heave", "roll", "pitch", "yaw"]
+
+
+def test_what_a_rotor_alone_with_two_blades_has_not():
+    single = build(rotors=[heavier(2)])
+    isolated = IsolatedRotor(single, Fidelity(lead_lag=False))
+    point = isolated.steady((0.1, 0.0, 0.0))
+    with pytest.raises(TrimError, match=r"R1 has 2 blades: no constant matrix describes them"):
+        isolated.matrix(point)
+    stand = {"free": ["x"], "mass": [9.0, 0, 0, 0, 0, 0], "spring": [1e4, 0, 0, 0, 0, 0]}
+    with pytest.raises(TrimError, match="R1 has 2 blades: allowed for them is a hub that is held, at a given speed"):
+        IsolatedRotor(build(rotors=[heavier(2)], body={"stand": stand}))
+
+
+def test_drives_are_refused_in_trims():
+    drive = {"rotors": ["R1", "R2"], "inertia": 0.01}
+    data = aircraft_data(every_rotor=heavier(2)) | {"drives": [drive]}
+    with pytest.raises(TrimError, match="drives: allowed with two blades are none"):
+        trim(Aircraft.from_dict(data))
+
+
+def test_a_damper_may_be_missing(two):
+    """Unequal blades: the period is a revolution in any case, and a trim says so."""
+    uneven = two.with_value("rotors.blade_lag_damping", [1.0, 0.0])
+    point = trim(uneven, 8.0)
+    assert point.residual < 1e-9
+    assert any("unequal lag dampers" in line for line in point.warnings)
+
+
+def teetering(**more):
+    hinges = {"hinge_offset": 0.0, "flap_hinge_offset": 0.0, "flap_hinge": "teetering"}
+    return heavier(2, **hinges, **{"flap_spring": 0.0, "lag_spring": 400.0, "flap_rest_deg": 2.0, **more})
+
+
+@pytest.mark.parametrize("spring", [0.0, 40.0])
+def test_a_teetering_rotor_flaps_at_one_per_revolution(spring):
+    """Without a spring exactly; with one the root of 1 + K / (A_1 Omega^2). Coning is no state of its stability."""
+    changes = {"flap_spring": spring, "lag_damping": 0.0, "flap_rest_deg": 0.0}
+    aircraft = build(rotors=[teetering(**changes)], environment=WEIGHTLESS_VACUUM)
+    isolated, speed = IsolatedRotor(aircraft, Fidelity(lead_lag=False)), aircraft.rotors[0].speed
+    found = isolated.exponents(isolated.steady((0.0, 0.0, 0.0)), inflow=False)
+    assert len(found) == 2
+    turns = math.sqrt(1 + spring / (aircraft.rotors[0].second_moment * speed**2)) - 1
+    np.testing.assert_allclose(np.abs(found.imag), turns * speed, atol=2e-4 * speed)
+    np.testing.assert_allclose(found.real, 0.0, atol=1e-4 * speed)
+
+
+def test_a_teetering_helicopter_flies_its_trim():
+    """The coning is the precone, no spring or hinge offset tilts the hub, and the flight repeats."""
+    aircraft = build(every_rotor=teetering(), rotors=[{"hub": [0, -0.645, -0.3]}, {"hub": [0, 0.645, -0.3]}])
+    point = trim(aircraft, 10.0, lead_lag=False)
+    assert point["a0(1)"] == pytest.approx(math.radians(2.0), abs=1e-9)
+    period = 2 * math.pi / aircraft.rotors[0].speed
+    flight = simulate(aircraft, point, point.controls, 20 * period, tick=period, azimuth_step=0.1, lead_lag=False)
+    np.testing.assert_allclose(
+        flight["state"][-1][S.VELOCITY :], flight["state"][0][S.VELOCITY :], rtol=1e-3, atol=1e-3
+    )
+    names = {name for name in point.state_names if not name.startswith(("xi", "dxi"))}
+    assert len(floquet(aircraft, point).exponents) == len(names - {"a0(1)", "a0(2)", "da0(1)", "da0(2)"})
+
+
+def test_a_teetering_hub_feels_no_moment_of_flapping():
+    """Of a rotor without spring, offset, precone and lag the hub has no moment across the shaft, whatever its flap."""
+    aircraft = build(rotors=[teetering(flap_rest_deg=0.0)], environment={"gravity": 0.0})
+    point = IsolatedRotor(aircraft, Fidelity(lead_lag=False)).steady((0.12, 0.02, 0.03), 10.0)
+    assert np.abs(point.moment[:2]).max() < 2e-2 * abs(point.moment[2])
+
+
+def test_teetering_rotors_that_are_none():
+    for changes, says in (
+        ({"blades": 3}, "flap_hinge = 'teetering', blades are 3: allowed are 2"),
+        ({"hinge_offset": 0.01}, "'teetering', hinge_offset is 0.01: allowed is 0, the hinge is at the axis"),
+    ):
+        with pytest.raises(AircraftError, match=says):
+            build(rotors=[teetering() | changes])
+    with pytest.raises(AircraftError, match=r"'teetering', options\.coupling is paper: allowed is complete"):
+        build(rotors=[teetering()], options={"coupling": "paper"})

@@ -39,6 +39,8 @@ def stand_in(aircraft: Aircraft, rotors: "list[MomentumRotor]") -> tuple[Nominal
     nominal = tuple(_nominal(aircraft, theory, rotor.swashplate_offset) for theory, rotor in pairs)
     for row, i in enumerate(aircraft.commanded_drives, len(rotors)):
         drive, own = aircraft.drives[i], _driven(aircraft, i)
+        if _is_held(aircraft, i):
+            continue
         torque = _torque(aircraft, i, nominal)
         speed = aircraft.drive_speed(i)
         place = S.SET_POINT if drive.has_governor else S.THROTTLE
@@ -56,6 +58,8 @@ def stand_in(aircraft: Aircraft, rotors: "list[MomentumRotor]") -> tuple[Nominal
 def set_drives(aircraft: Aircraft, nominal: tuple[Nominal, ...], responses: "tuple[Response, ...]", x: Array) -> None:
     """Set speed, torque and governor of the commanded drives in a simulation state, by the thrusts of their rotors."""
     for i in aircraft.commanded_drives:
+        if _is_held(aircraft, i):  # it begins as one without commands
+            continue
         drive, places, speed = aircraft.drives[i], aircraft.layout.drive(i), aircraft.drive_speed(i)
         j = _driven(aircraft, i)[0]
         ratio = responses[j].thrust / nominal[j].thrust if nominal[j].thrust > 0.0 else 1.0
@@ -65,6 +69,12 @@ def set_drives(aircraft: Aircraft, nominal: tuple[Nominal, ...], responses: "tup
         x[places[S.ENGINE_TORQUE]] = torque
         if drive.has_governor:
             x[places[S.GOVERNOR]] = steady_throttle(drive, share * speed, torque) - drive.throttle
+
+
+def _is_held(aircraft: Aircraft, drive: int) -> bool:
+    """No control that a trim finds acts on a drive: its rotors are controlled by their collectives."""
+    first = S.ROW * (len(aircraft.rotors) + aircraft.commanded_drives.index(drive))
+    return not aircraft.trim_rigging[first : first + S.ROW, :-1].any()
 
 
 def _driven(aircraft: Aircraft, drive: int) -> list[int]:

@@ -303,7 +303,7 @@ def largest_torque(drive: Drive, speed: float) -> float:
     """Largest steady torque that a drive gives to its rotors at a speed [rad/s], with a full battery [N m]."""
     if drive.engine == "none":
         return 0.0
-    throttle = 1.0 if drive.has_governor else drive.throttle
+    throttle = 1.0 if drive.has_governor or drive.mixing else drive.throttle
     most = min(drive.max_torque, drive.max_power / speed)
     if drive.engine == "electric":
         voltage = throttle * drive.full_voltage - drive.torque_constant * speed

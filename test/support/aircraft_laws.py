@@ -52,6 +52,8 @@ def _instant(aircraft, number):
     model, rng, count = Model(Aircraft.from_dict(data)), np.random.default_rng([5, number]), len(aircraft.rotors)
     x, psi = violent_state(model, rng), rng.uniform(0.0, 6.0, count)
     swash = 0.05 * rng.normal(size=(count, 3)) + [0.1, 0.0, 0.0]
+    commands = np.tile([0.6, 1.0, 0.0], (len(aircraft.rows) - count, 1))  # throttle and set point of drives
+    swash = np.concatenate([swash, commands])
     return data, model, x, swash, psi, 5.0 * rng.normal(size=3)
 
 
@@ -59,7 +61,9 @@ def mirror_error(aircraft, number):
     """Return how far the derivative of the image of a state is from the image of the derivative, relative."""
     data, model, x, swash, psi, wind = _instant(aircraft, number)
     rates, image = model.derivative(x, swash, psi, wind), Model(Aircraft.from_dict(mirrored_data(data)))
-    found = image.derivative(mirrored_state(x), mirrored_swash(swash), psi, wind * POLAR)
+    count = len(aircraft.rotors)
+    mirrored = np.concatenate([mirrored_swash(swash[:count]), swash[count:]])
+    found = image.derivative(mirrored_state(x), mirrored, psi, wind * POLAR)
     return float(np.abs(found - mirrored_state(rates)).max() / np.abs(rates).max())
 
 

@@ -119,7 +119,8 @@ def fuselage_load(ac, fuselage, local):
     if not local.any():  # no flow has no direction, and no load
         return np.zeros(3), np.zeros(3)
     ahead = local / np.linalg.norm(local)
-    down = np.array([-w, 0.0, u]) / np.hypot(u, w)
+    plane = np.hypot(u, w)
+    down = np.array([-w, 0.0, u]) / plane if plane else np.array([0.0, 0.0, 1.0])
     right = np.cross(down, ahead)
     pressure = 0.5 * ac.environment.air_density * (local @ local)
     areas = {name: area(fuselage, name, alpha, beta) for name in ("drag", "side", "lift", "roll", "pitch", "yaw")}

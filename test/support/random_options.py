@@ -281,6 +281,9 @@ def _drives(data: dict[str, Any], rng: np.random.Generator) -> None:
     area = sum(math.pi * rotor["radius"] ** 2 for rotor in lifting)
     induced = weight * math.sqrt(weight / (2.0 * density * area))
     data["drives"] = [_drive(group, 2.0 * induced, len(groups), rng) for group in groups]
+    for drive in data["drives"]:
+        if "vane" in data["controls"] and "governor" in drive:  # 1 deg is 1 % of the speed
+            drive["mixing"] = {"set_point": {"vane": 0.573}}
 
 
 def _drive(rotors: list[dict[str, Any]], power: float, count: int, rng: np.random.Generator) -> dict[str, Any]:

@@ -295,7 +295,7 @@ class MomentumTheory:
         share : float
             Of weight and drag that is to be carried.
         controls : ndarray, shape (4,), optional
-            Controls [rad] that are to stay: what the rotors do with them is told, whether it balances or not.
+            Controls [rad] that are held: the result is what the rotors do with them, balanced or not.
         """
         search = _Search(self, condition, share, controls)
         for _ in range(MAX_STEPS):

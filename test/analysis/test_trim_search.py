@@ -509,8 +509,8 @@ def test_a_drive_that_is_too_weak_is_reported_with_what_the_rotors_take(sbs, eng
     with pytest.raises(TrimError) as error:
         trim(Aircraft.from_dict(data))
     taken = trim(sbs).torque.sum()
-    told = f"no trim: drive 1 gives up to {most:.3g} N m, its rotors take {taken:.3g} N m at the speed of the file; "
-    assert told in str(error.value)
+    message = f"no trim: drive 1 gives up to {most:.3g} N m, its rotors take {taken:.3g} N m at the speed of the file; "
+    assert message in str(error.value)
     data["drives"][0]["engine"] = {"kind": "engine", "max_torque": 1.2 * taken}
     assert trim(Aircraft.from_dict(data)).torque.sum() == pytest.approx(taken, rel=1e-3)
 

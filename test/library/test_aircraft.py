@@ -1131,7 +1131,7 @@ def test_a_partial_airfoil_is_extended_for_the_blades_of_each_rotor(tmp_path):
 
 
 def test_airfoils_along_the_blade_count_and_travel_with_the_aircraft(sbs, tmp_path):
-    """The element at the middle of which another airfoil has begun is the first that has it; files hold each once."""
+    """The element at the middle of which another airfoil has started is the first that has it; files hold each once."""
     span = {"stations": [0.5, 0.9], "values": ["linear_573", "naca0012"]}
     aircraft = sbs.with_value("rotors[0].outboard_airfoils", span)
     names = [table.name for table in aircraft.sections[0]]

@@ -24,7 +24,7 @@ from sbs_sim.model.airfoil import (
 
 GRID_DEG = 0.1  # to which angles without a common step are moved
 BROADSIDE_DEG = 90.0
-CLOSED = 1e-3  # of lift and drag at -180 and 180 deg: larger differences are told
+CLOSED = 1e-3  # of lift and drag at -180 and 180 deg: larger differences are reported
 NO_LIFT = 1e-3  # so much lift at 0 deg a symmetric section may have, for programs do not iterate to zero
 MAX_POLARS = 200
 

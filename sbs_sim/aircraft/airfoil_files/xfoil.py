@@ -40,17 +40,17 @@ def read_xfoil(path: Path, lines: Sequence[str]) -> AirfoilData:
 
 def _read_polar(path: Path, lines: Sequence[str], first: int, end: int) -> tuple[Polar, int]:
     """Polar of the lines from its title on, and the number of its angles that are repeated."""
-    begun = next((i for i in range(first, end) if COLUMNS.match(lines[i])), end)
-    if begun == end:
+    head = next((i for i in range(first, end) if COLUMNS.match(lines[i])), end)
+    if head == end:
         raise AirfoilError(f"{path}:{first + 1}: a line with alpha, CL and CD must follow the title of the polar")
     numbers = dict[str, float]()
-    for i in range(first, begun):
+    for i in range(first, head):
         if "~" in lines[i]:
             raise AirfoilError(f"{path}:{i + 1}: {plain(lines[i])!r} must be fixed Reynolds and Mach numbers")
         numbers |= _numbers(path, i + 1, lines[i])
     if "reynolds" not in numbers:
-        raise AirfoilError(f"{path}:{begun + 1}: a line with Re = or Reynolds number must be above the polar")
-    return make_polar(path, begun + 1, _rows(path, lines, begun + 1, end), numbers)
+        raise AirfoilError(f"{path}:{head + 1}: a line with Re = or Reynolds number must be above the polar")
+    return make_polar(path, head + 1, _rows(path, lines, head + 1, end), numbers)
 
 
 def _numbers(path: Path, line: int, text: str) -> dict[str, float]:

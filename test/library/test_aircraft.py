@@ -407,6 +407,7 @@ OPTIONAL = {
     "speed_of_sound",
     "interpolation",
     "swashplate_offset_deg",
+    "schedule",
     "blade_inertia",
     "flap_rest_deg",
     "induced_power_factor",

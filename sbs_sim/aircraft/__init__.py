@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks, config_file, validation
 from sbs_sim.aircraft.airfoils import load_tables
-from sbs_sim.aircraft.commands import Row, drive_offset, padded, rows_of
+from sbs_sim.aircraft.commands import Row, drive_offset, padded, rows_of, scheduled_controls
 from sbs_sim.aircraft.consistency import consistency_problems, table_problems
 from sbs_sim.aircraft.declaration import cached_by_class, declarations, frozen, schema_of, values_of
 from sbs_sim.aircraft.description import Array, Description, Range, Rotor
@@ -41,7 +41,7 @@ from sbs_sim.model.frames import ONE, hub_axes
 from sbs_sim.model.mixing import mixed
 from sbs_sim.model.packing import by_blades, lane_count, side_by_side
 from sbs_sim.model.records import Model
-from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, SPEED, StateLayout
+from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, SPEED, SWASHPLATE_NAMES, StateLayout
 
 MAX_CHANGES_SHOWN = 5  # in a refusal
 TYPICAL_ANGLE = 0.3  # rad; the range of a control that is no angle counts as that in trims
@@ -284,7 +284,9 @@ class Aircraft(Description):
 
         Of an aircraft whose controls act on drives too, a row for each such drive follows: throttle, set point of the
         governor over the speed in the file, and zero; then for each surface that controls act on one with the incidence
-        that they add [rad], and zeros; see `rows`. All that is called swashplate has these rows.
+        that they add [rad], and zeros; then for each control whose factors change with the airspeed one with its value,
+        and zeros, see `rows`. All that is called swashplate has these rows. The angles are those without what
+        `schedule` of a rotor adds at the present airspeed, which `scheduled` has.
         """
         angles = np.empty((3 * len(self.rows), 1))
         mixed(self.rigging, np.asarray(controls, dtype=float).reshape(-1, 1), ONE, angles)
@@ -310,6 +312,7 @@ class Aircraft(Description):
         """Swashplate angles of all rotors over the pilot controls, shape (3 n_rows, n_controls), see `mix`."""
         moved = [self.drives[i].mixing for i in self.commanded_drives]
         moved += [self.body.surfaces[i].mixing for i in self.commanded_surfaces]
+        moved += [{"": {name: 1.0}} for name in scheduled_controls(self)]
         others = [padded(self._factors(mixing)) for mixing in moved]
         return frozen(np.concatenate([*(self._factors(rotor.mixing) for rotor in self.rotors), *others]))
 
@@ -335,8 +338,21 @@ class Aircraft(Description):
         """`mixing`, and as its last column the swashplate angles where all controls are zero [rad]."""
         drives = [drive_offset(self.drives[i]) for i in self.commanded_drives]
         offsets = np.concatenate([*(rotor.swashplate_offset for rotor in self.rotors), *drives])
-        surfaces = np.zeros(3 * len(self.commanded_surfaces))
-        return frozen(np.column_stack([self.mixing, np.concatenate([offsets, surfaces])]))
+        others = np.zeros(len(self.mixing) - len(offsets))
+        return frozen(np.column_stack([self.mixing, np.concatenate([offsets, others])]))
+
+    def scheduled(self, rows: ArrayLike, airspeed: float) -> Array:
+        """Commands of `mix` with what the schedules of the rotors add at an airspeed [m/s], shape (n_rows, 3)."""
+        given = np.asarray(rows, dtype=float)
+        found = given.copy()
+        controls = dict(
+            zip(scheduled_controls(self), given[len(given) - len(scheduled_controls(self)) :, 0], strict=True)
+        )
+        for j, rotor in enumerate(self.rotors):
+            for entry in rotor.schedule:
+                share = np.interp(airspeed, entry.airspeed, entry.values)
+                found[j, SWASHPLATE_NAMES.index(entry.angle)] += share * controls.get(entry.control, 1.0)
+        return found
 
     @cached_property
     def control_names(self) -> tuple[str, ...]:

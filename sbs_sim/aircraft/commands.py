@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 THROTTLE_RANGE, SET_POINT_RANGE = (0.0, 1.0), (0.0, 2.0)  # of a command to a drive
 NONE = (0.0, 0.0)  # of what is not used
 ROUNDING = 1e-12  # that a command may be beyond its range
+LEAST_FACTOR = 1e-3  # of a control, below which it may move as if it had this one
 AT_ONCE = 1e9  # 1/s; a command to a drive has no actuator: the lag of its engine follows
 
 
@@ -27,12 +28,12 @@ class Row(NamedTuple):
     Attributes
     ----------
     owner : str
-        Name of the rotor or surface, or "drive 1".
+        Name of the rotor or surface, "drive 1", or "control" whose factors change with the airspeed.
     names : tuple of str
         Of the numbers; empty for what is not used.
     ranges : tuple of (float, float)
     unit : str
-        "rad" for a swashplate and a surface, "1" for a drive.
+        "rad" for a swashplate and a surface, "1" for a drive, that of the control.
     rate : float
         Fastest motion of each [unit/s].
     """
@@ -45,7 +46,9 @@ class Row(NamedTuple):
 
     def shown(self, value: float) -> str:
         """A value with its unit, as a person reads it."""
-        return f"{math.degrees(value):.6g} deg" if self.unit == "rad" else f"{value:.6g}"
+        if self.unit == "rad":
+            return f"{math.degrees(value):.6g} deg"
+        return f"{value:.6g}" if self.unit == "1" else f"{value:.6g} {self.unit}"
 
 
 def rows_of(aircraft: "Aircraft") -> tuple[Row, ...]:
@@ -67,7 +70,25 @@ def rows_of(aircraft: "Aircraft") -> tuple[Row, ...]:
         Row(one.name, (INCIDENCE, "", ""), (one.incidence_range, NONE, NONE), "rad", one.incidence_rate)
         for one in moving
     )
-    return (*plates, *drives, *surfaces)
+    return (*plates, *drives, *surfaces, *(_control_row(aircraft, name) for name in scheduled_controls(aircraft)))
+
+
+def scheduled_controls(aircraft: "Aircraft") -> tuple[str, ...]:
+    """Names of the pilot controls whose factors change with the airspeed: the aircraft gets them as they are."""
+    used = {entry.control for rotor in aircraft.rotors for entry in rotor.schedule}
+    return tuple(name for name in aircraft.control_names if name in used)
+
+
+def _control_row(aircraft: "Aircraft", name: str) -> Row:
+    """Row of a control, which moves no faster than the actuators that its factors move."""
+    control = aircraft.controls[aircraft.control_names.index(name)]
+    rates = [
+        rotor.swashplate_rate / max(float(np.abs(entry.factor).max()), LEAST_FACTOR)
+        for rotor in aircraft.rotors
+        for entry in rotor.schedule
+        if entry.control == name
+    ]
+    return Row("control", (name, "", ""), (control.range, NONE, NONE), control.unit, min(rates))
 
 
 def drive_offset(drive: Drive) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from sbs_sim import checks
 from sbs_sim.aircraft.blade_mass import MIN_BLADE_MASS
-from sbs_sim.aircraft.description import STAND_AXES, TRIMMED_CONTROLS, Array, Range, Rotor
+from sbs_sim.aircraft.description import STAND_AXES, TRIMMED_CONTROLS, Array, MixingSchedule, Range, Rotor
 from sbs_sim.aircraft.part_consistency import part_problems
 from sbs_sim.model.airfoil import FINEST_DEG, MAX_HALF, NUMBER_NAMES, common_half
 from sbs_sim.model.state import CONTROL_NAMES, EULER_NAMES, SWASHPLATE_NAMES
@@ -239,6 +239,12 @@ def _control_problems(aircraft: "Aircraft") -> list[str]:
             unknown = [name for name in factors if name not in names]
             where = ", ".join(f"rotors[{i}].mixing.{angle}.{name}" for name in unknown)
             problems += [f"{where}: unknown key, allowed are {', '.join(names)}"] if unknown else []
+    problems += [
+        f"rotors[{i}].schedule[{k}].control = {entry.control!r}: allowed are {', '.join(names)}"
+        for i, rotor in enumerate(aircraft.rotors)
+        for k, entry in enumerate(rotor.schedule)
+        if entry.control and entry.control not in names
+    ]
     parts = [(f"drives[{i}]", drive.mixing) for i, drive in enumerate(aircraft.drives)]
     parts += [(f"body.surfaces[{i}]", surface.mixing) for i, surface in enumerate(aircraft.body.surfaces)]
     for path, mixing in parts:
@@ -298,6 +304,8 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
     of_duct = (rotor.duct_turning, rotor.ram_recovery, rotor.lip_arm, rotor.lip_stall)
     if rotor.duct_exit is None and of_duct != (1.0, 1.0, 0.0, None):
         problems.append("duct.exit_area: missing; allowed is 0.25 to 4")
+    for i, entry in enumerate(rotor.schedule):
+        problems += [f"schedule[{i}].{problem}" for problem in _schedule_problems(entry)]
     problems += _range_problems("collective_range_deg", rotor.collective_range)
     return problems + _range_problems("cyclic_range_deg", rotor.cyclic_range)
 
@@ -312,6 +320,18 @@ def _teeter_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
         (aircraft.options.coupling == "complete", "options.coupling is paper: allowed is complete"),
     ]
     return [f"flap_hinge = 'teetering', {text}" for is_met, text in relations if not is_met]
+
+
+def _schedule_problems(entry: MixingSchedule) -> list[str]:
+    used, unused = ("factor", "offset_deg") if entry.control else ("offset_deg", "factor")
+    given = {"factor": entry.factor, "offset_deg": entry.offset}
+    if not len(entry.airspeed) or not (np.diff(entry.airspeed) > 0.0).all():
+        return ["airspeed: allowed are one or more numbers that increase"]
+    if len(given[unused]):
+        return [f"{unused}: allowed {'without' if entry.control else 'with'} a control only"]
+    if len(given[used]) != len(entry.airspeed):
+        return [f"{used}: allowed is a list of {len(entry.airspeed)}, the number of airspeed"]
+    return []
 
 
 def _damper_length(rotor: Rotor) -> float:

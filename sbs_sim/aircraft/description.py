@@ -402,6 +402,29 @@ def _linkage(letter: str, text: str) -> Any:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class MixingSchedule(ByContent):
+    """A share in an angle of a swashplate over the airspeed, straight between the points and level outside."""
+
+    angle: str = choice("Angle of the swashplate that changes with the airspeed", SWASHPLATE_NAMES)
+    control: str = string(
+        "Name of the pilot control whose factor changes; empty where it is the angle itself",
+        may_be_empty=True,
+        default="",
+    )
+    airspeed: Array = series("Airspeeds, increasing", 0, 1000, "m/s")
+    factor: Array = series(
+        "Factor of the control to be added to that of `mixing` at each of them, per rad or unit", -10, 10, "rad/rad"
+    )
+    offset: Array = series("Angle to be added at each of them, where there is no control", -90, 90, "deg")
+
+    @property
+    def values(self) -> Array:
+        """Factors, or angles [rad]."""
+        return self.factor if self.control else self.offset
+
+
+MAX_SCHEDULES = 32
 MAX_STATIONS, MAX_AIRFOILS = 200, 20
 
 # Keys of a rotor of which a file has the last one, or the others.
@@ -672,6 +695,9 @@ class Rotor(ByContent):
     )
     mixing: dict[str, dict[str, float]] = _mixing()
     swashplate_offset: Array = _offsets()
+    schedule: tuple[MixingSchedule, ...] = parts(
+        "Shares in the swashplate angles that change with the airspeed", MixingSchedule, 0, MAX_SCHEDULES, default=[]
+    )
 
     @property
     def wake_expansion(self) -> float:

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.aircraft.commands import scheduled_controls
 from sbs_sim.aircraft.declaration import model_values
 from sbs_sim.aircraft.description import ENGINES, Body, Drive, Rotor
-from sbs_sim.aircraft.surfaces import Parts, parts_of
+from sbs_sim.aircraft.surfaces import Parts, parts_of, slope_changes
 from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import DEGREE, AirfoilTable, Grid, cell_grid, cells, common_grid
 from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import hub_axes
-from sbs_sim.model.state import ENGINE_TORQUE, GOVERNOR, ROW, SPEED, UNSEEN_NAMES, harmonic_count
+from sbs_sim.model.state import ENGINE_TORQUE, GOVERNOR, ROW, SPEED, SWASHPLATE_NAMES, UNSEEN_NAMES, harmonic_count
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
@@ -53,6 +54,7 @@ def model_of(aircraft: "Aircraft") -> R.Model:
         table=table,
         stall=_stall(aircraft),
         **_parts(aircraft)._asdict(),
+        **_schedules(aircraft),
     )
 
 
@@ -78,6 +80,22 @@ def _parts(aircraft: "Aircraft") -> Parts:
     for row, i in enumerate(aircraft.commanded_surfaces, first):
         parts.surfaces["command_index"][i] = ROW * row
     return parts
+
+
+def _schedules(aircraft: "Aircraft") -> dict[str, NDArray[Any]]:
+    """What changes swashplate angles with the airspeed."""
+    entries = [(j, entry) for j, rotor in enumerate(aircraft.rotors) for entry in rotor.schedule]
+    points = max((len(entry.airspeed) for _, entry in entries), default=0)
+    schedules, bends = R.records(R.SCHEDULE, len(entries), 1), R.aligned((len(entries), points, 2, 1), float)
+    names = scheduled_controls(aircraft)
+    first = len(aircraft.rows) - len(names)
+    for k, (j, entry) in enumerate(entries):
+        schedules[k]["first"][..., 0] = entry.values[0]
+        schedules[k]["target"] = ROW * j + SWASHPLATE_NAMES.index(entry.angle)
+        schedules[k]["source"] = ROW * (first + names.index(entry.control)) if entry.control else -1
+        bends[k, : len(entry.airspeed), 0, 0] = entry.airspeed
+        bends[k, : len(entry.airspeed), 1, 0] = slope_changes(entry.airspeed, entry.values)
+    return {"schedules": schedules, "bends": bends}
 
 
 def _stall(aircraft: "Aircraft") -> Array:
@@ -116,6 +134,7 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["axial_dampers"] = any(rotor.damper_damping > 0.0 for rotor in aircraft.rotors)
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
     switches["stand"] = aircraft.body.is_stand
+    switches["scheduled"] = any(rotor.schedule for rotor in aircraft.rotors)
     switches["ducts"] = any(rotor.duct_exit is not None for rotor in aircraft.rotors)
     switches["teetering"] = any(rotor.is_teetering for rotor in aircraft.rotors)
     return switches

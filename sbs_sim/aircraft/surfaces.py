@@ -100,7 +100,7 @@ def _ramps(parts: Sequence[Surface | Fuselage]) -> Array:
     for i, own in enumerate(curves):
         for knots, values, at, to in own:
             ramps[i, : len(knots), at, 0] = knots
-            ramps[i, : len(knots), to, 0] = _slope_changes(knots, values)
+            ramps[i, : len(knots), to, 0] = slope_changes(knots, values)
     return ramps
 
 
@@ -113,7 +113,7 @@ def _curves(part: Surface | Fuselage) -> list[tuple[Array, Array, int, int]]:
     return found
 
 
-def _slope_changes(knots: Array, values: Array) -> Array:
+def slope_changes(knots: Array, values: Array) -> Array:
     """Change of the slope at every point of a curve that is level before the first and behind the last."""
     slopes = np.diff(values) / np.diff(knots)
     return np.diff(np.concatenate([[0.0], slopes, [0.0]])) if len(knots) else np.zeros(0)

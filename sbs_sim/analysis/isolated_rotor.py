@@ -90,14 +90,18 @@ class IsolatedRotor:
     Raises
     ------
     TrimError
-        The aircraft has several rotors, or an engine; or a rotor with two blades that turns freely, or on a stand that
-        gives way.
+        The aircraft has several rotors, an engine, or a schedule of its swashplate; or a rotor with two blades that
+        turns freely, or on a stand that gives way.
     """
 
     def __init__(self, aircraft: Aircraft, fidelity: Fidelity | None = None) -> None:
         checks.instance("aircraft", aircraft, Aircraft, TrimError)
         if len(aircraft.rotors) != 1:
             raise TrimError(f"rotors: {len(aircraft.rotors)} of them; allowed is one that stands alone")
+        if aircraft.rotors[0].schedule:
+            raise TrimError(
+                "rotors[0].schedule: allowed is none for a rotor that stands alone, its swashplate is given"
+            )
         self.is_driven = len(aircraft.drives) > 0
         if self.is_driven:
             checks.choice("drives[0].engine.kind", aircraft.drives[0].engine, ("none",), TrimError)

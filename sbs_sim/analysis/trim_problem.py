@@ -205,6 +205,11 @@ class TrimProblem:
         controls = self.controls(unknowns)
         return _beyond_limits(self.aircraft, controls, self.aircraft.mix(controls))
 
+    def _beyond(self, condition: TrimCondition, unknowns: Array, swash: Array) -> tuple[str, ...]:
+        """`beyond_limits` at the airspeed of a flight."""
+        speed = float(np.linalg.norm(condition.along_heading()[:3]))
+        return _beyond_limits(self.aircraft, self.controls(unknowns), self.aircraft.scheduled(swash, speed))
+
     def point(
         self, condition: TrimCondition, unknowns: Array, method: str, iterations: int, inner_iterations: int = 0
     ) -> TrimPoint:
@@ -233,7 +238,7 @@ class TrimProblem:
             method=method,
             iterations=iterations,
             inner_iterations=inner_iterations,
-            beyond_limits=self.beyond_limits(unknowns),
+            beyond_limits=self._beyond(condition, unknowns, swash),
             warnings=self._warnings(x, swash),
             parameter_hash=self.aircraft.parameter_hash,
         )

@@ -27,6 +27,7 @@ from sbs_sim.lanes import (
     rounded,
     select,
     spread,
+    sqrt,
     transposed,
 )
 from sbs_sim.model import state as S
@@ -53,7 +54,7 @@ from sbs_sim.model.inflow import INVERSE_MASS, Inflow, disc_flow, inflow_rates
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
 from sbs_sim.model.section import section_loads
-from sbs_sim.model.surfaces import fuselage_load, rotor_wash, surface_load
+from sbs_sim.model.surfaces import fuselage_load, ramp, rotor_wash, surface_load
 from sbs_sim.model.teeter import hold_coning, lock_coning
 from sbs_sim.model.trigonometry import cosine_sine
 
@@ -74,6 +75,8 @@ class Aircraft(NamedTuple):
     fuselages: Any
     ramps: Any
     shapes: Any
+    schedules: Any
+    bends: Any
 
 
 class Memory(NamedTuple):
@@ -93,6 +96,7 @@ class Memory(NamedTuple):
     span: Any
     coning: Any
     coning_change: Any
+    commands: Any
 
 
 class Flight(NamedTuple):
@@ -171,6 +175,8 @@ def with_rotors(model, rotors, blades):
         fuselages=as_records(model.fuselages),
         ramps=as_lanes(model.ramps, air),
         shapes=model.shapes,
+        schedules=as_records(model.schedules),
+        bends=as_lanes(model.bends, air),
     )
 
 
@@ -193,6 +199,7 @@ def memory_in_lanes(work):
         span=work.span,
         coning=as_records(work.coning),
         coning_change=as_lanes(work.coning_change, sums),
+        commands=as_lanes(work.commands, sums),
     )
 
 
@@ -220,10 +227,14 @@ def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
 @kernel
 def set_known_loads(aircraft, memory, flight, swash, psi):
     """Set what is known before the accelerations are, of blades and hubs; the loads on the rigid part."""
-    set_blade_terms(aircraft, memory, flight, swash, psi)
+    commands = swash
+    if aircraft.switches[0].scheduled == 1:
+        set_commands(aircraft, memory, flight, swash)
+        commands = memory.commands
+    set_blade_terms(aircraft, memory, flight, commands, psi)
     sum_blades(aircraft, memory)
     set_hub_velocities(aircraft, memory, flight)
-    return body_loads(aircraft, memory, flight, swash)
+    return body_loads(aircraft, memory, flight, commands)
 
 
 @kernel
@@ -251,6 +262,20 @@ def body_motion(aircraft, x, wind):
     velocity, omega = S.vector_at(x, S.VELOCITY), S.vector_at(x, S.RATES)
     air_velocity = velocity - transposed(to_earth) @ Vector(wind[0], wind[1], wind[2])
     return Flight(to_earth, air_velocity, velocity, omega, to_earth.z * aircraft.air[0].gravity)
+
+
+@kernel
+def set_commands(aircraft, memory, flight, swash):
+    """Set the commands with the shares in swashplate angles that change with the airspeed (theory.md section 4.5)."""
+    commands, speed = memory.commands, sqrt(dot(flight.air_velocity, flight.air_velocity))
+    for i in range(commands.shape[0]):
+        commands[i] = swash[i]
+    for k in range(aircraft.schedules.shape[0]):
+        schedule = aircraft.schedules[k]
+        share = schedule.first + ramp(aircraft.bends[k], 0, 1, speed)
+        if schedule.source >= 0:
+            share = rounded(share * swash[schedule.source])
+        commands[schedule.target] = commands[schedule.target] + share
 
 
 class HubMotion(NamedTuple):

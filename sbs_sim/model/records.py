@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.model.state import BODY_SIZE, UNSEEN_NAMES
+from sbs_sim.model.state import BODY_SIZE, ROW, UNSEEN_NAMES
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -42,6 +42,7 @@ SWITCHES = {
     "complete_hub_moment": INTEGER,
     "axial_dampers": INTEGER,  # 1 where a rotor has them
     "stand": INTEGER,
+    "scheduled": INTEGER,  # 1 where shares in swashplate angles change with the airspeed
     "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
     "teetering": INTEGER,  # 1 where a rotor is
 }
@@ -149,6 +150,12 @@ DRIVE = {
 }
 # a drive at work: column of its speed in the mass matrix, inertia, torques, acceleration
 SHAFT = {"force": VECTOR, "moment": VECTOR, "inverse_inertia": LANES, "torque": LANES, "acceleration": LANES}
+# a share in an angle of a swashplate that changes with the airspeed, see `sbs_sim.model.dynamics.set_commands`
+SCHEDULE = {
+    "first": LANES,  # factor, or angle [rad], up to the first airspeed
+    "target": INTEGER,  # index of the angle among the commands
+    "source": INTEGER,  # of the control that the factor is of; -1 for an angle
+}
 ELEMENT = {
     "span": LANES,  # from the flap hinge [m]
     "chord": LANES,
@@ -313,6 +320,10 @@ class Model(NamedTuple):
         Their curves of straight lines, see `sbs_sim.model.surfaces`.
     shapes : ndarray, shape (cells, 16)
         Their coefficients over angles, as `table`.
+    schedules : structured ndarray, shape (schedules,)
+        What changes swashplate angles with the airspeed.
+    bends : ndarray, shape (schedules, points, 2, n)
+        Airspeeds [m/s], and the change of the slope of each there.
     """
 
     switches: NDArray[Any]
@@ -330,6 +341,8 @@ class Model(NamedTuple):
     fuselages: NDArray[Any]
     ramps: Array
     shapes: Array
+    schedules: NDArray[Any]
+    bends: Array
 
 
 class Work(NamedTuple):
@@ -366,6 +379,8 @@ class Work(NamedTuple):
     coning : structured ndarray, shape (quads,)
         Of an aircraft with teetering rotors, else empty, as the next.
     coning_change : ndarray, shape (n_rotors, n)
+    commands : ndarray, shape (3 n_rows, n)
+        Swashplate angles at the present airspeed, where they change with it; else empty.
     """
 
     state: Array
@@ -388,6 +403,7 @@ class Work(NamedTuple):
     shafts: NDArray[Any]
     coning: NDArray[Any]
     coning_change: Array
+    commands: Array
 
 
 def state_size(model: Model) -> int:
@@ -427,7 +443,19 @@ def make_work(model: Model) -> Work:
         shafts=records(SHAFT, len(model.drives), n),
         coning=records(CONING, quads if teetering else 0, n),
         coning_change=aligned((len(rotors) if teetering else 0, n), float),
+        commands=aligned((_command_count(model), n), float),
     )
+
+
+def _command_count(model: Model) -> int:
+    """Numbers that controls command, where a schedule needs memory for them; the scheduled controls are the last."""
+    return int(max(model.schedules["source"].max(), _last_command(model))) + ROW if len(model.schedules) else 0
+
+
+def _last_command(model: Model) -> int:
+    """Index of the last row of commands but for those of scheduled controls."""
+    others = [*model.drives["command_index"].tolist(), *model.surfaces["command_index"].tolist()]
+    return max([ROW * (len(model.rotors) - 1), *others])
 
 
 def _copied(array: NDArray[Any]) -> NDArray[Any]:

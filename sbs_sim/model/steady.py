@@ -2,19 +2,16 @@
 
 from sbs_sim.lanes import Vector, as_lanes, cross, rounded, spread, zeros_like
 from sbs_sim.model.dynamics import (
-    body_loads,
     body_motion,
     in_lanes,
     memory_in_lanes,
     set_acceleration,
-    set_blade_terms,
     set_body_rates,
     set_hub_loads,
-    set_hub_velocities,
+    set_known_loads,
     set_rotor_rates,
     solve_blades,
     solve_blades_alone,
-    sum_blades,
     with_hub_loads,
 )
 from sbs_sim.model.kernel import entry, kernel
@@ -47,10 +44,7 @@ def steady_balance(model, x, swash, psi, wind, work, dx, imbalance):
     for i in range(given.shape[0]):
         memory.state[i] = given[i]
     flight = body_motion(aircraft, memory.state, as_lanes(wind, like))
-    set_blade_terms(aircraft, memory, flight, as_lanes(swash, like), as_lanes(psi, like))
-    sum_blades(aircraft, memory)
-    set_hub_velocities(aircraft, memory, flight)
-    loads = body_loads(aircraft, memory, flight, as_lanes(swash, like))
+    loads = set_known_loads(aircraft, memory, flight, as_lanes(swash, like), as_lanes(psi, like))
     steady = cross(flight.omega, flight.velocity) - flight.gravity
     set_acceleration(memory, steady, Vector(0.0, 0.0, 0.0))
     if aircraft.switches[0].complete_coupling == 1:

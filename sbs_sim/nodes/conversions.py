@@ -89,7 +89,7 @@ def swashplate_array(message: SwashplateArray) -> Array:
     """Swashplate angles [rad], shape (n_rows, 3), see `Aircraft.mix`."""
     angles = [[getattr(rotor, name) for name in S.SWASHPLATE_NAMES] for rotor in message.rotors]
     angles += [[*(getattr(drive, name) for name in S.COMMAND_NAMES), 0.0] for drive in message.drives]
-    angles += [[incidence, 0.0, 0.0] for incidence in message.incidence]
+    angles += [[value, 0.0, 0.0] for value in (*message.incidence, *message.scheduled)]
     return np.array(angles, dtype=float).reshape(-1, S.ROW)
 
 
@@ -99,10 +99,12 @@ def swashplate_messages(angles: Array) -> list[Swashplate]:
 
 
 def command_fields(aircraft: Aircraft, rows: Array) -> dict[str, Any]:
-    """Fields `drives` and `incidence` of a message, of commands of shape (n_rows, 3)."""
+    """Fields `drives`, `incidence` and `scheduled` of a message, of commands of shape (n_rows, 3)."""
     first, behind = len(aircraft.rotors), len(aircraft.rotors) + len(aircraft.commanded_drives)
+    last = behind + len(aircraft.commanded_surfaces)
     drives = [DriveCommand(**dict(zip(S.COMMAND_NAMES, row, strict=False))) for row in rows[first:behind].tolist()]
-    return {"drives": drives, "incidence": float64_array(np.ascontiguousarray(rows[behind:, 0]))}
+    single = {"incidence": rows[behind:last, 0], "scheduled": rows[last:, 0]}
+    return {"drives": drives, **{name: float64_array(np.ascontiguousarray(part)) for name, part in single.items()}}
 
 
 def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:

@@ -377,7 +377,7 @@ def schema_leaves(schema, path=()):
 
 
 # in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py
-ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage", "flap_hinge")
+ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage", "flap_hinge", "schedule")
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)
@@ -407,6 +407,7 @@ OPTIONAL = {
     "speed_of_sound",
     "interpolation",
     "swashplate_offset_deg",
+    "schedule",
     "blade_inertia",
     "flap_rest_deg",
     "induced_power_factor",

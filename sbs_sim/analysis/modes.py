@@ -86,13 +86,13 @@ class Mode(ByContent):
 
     @property
     def time_to_half(self) -> float:
-        """Time in which the amplitude halves [s]; infinite where it does not decay."""
-        return math.log(2.0) / -self.pole.real if self.pole.real < 0.0 else math.inf
+        """Time in which the amplitude halves [s]; infinite where it does not decay, by more than rounding gives."""
+        return math.log(2.0) / -self.pole.real if self.pole.real < -ALIKE * abs(self.pole) else math.inf
 
     @property
     def time_to_double(self) -> float:
-        """Time in which the amplitude doubles [s]; infinite where it does not grow."""
-        return math.log(2.0) / self.pole.real if self.pole.real > 0.0 else math.inf
+        """Time in which the amplitude doubles [s]; infinite where it does not grow, see `is_growing`."""
+        return math.log(2.0) / self.pole.real if self.is_growing else math.inf
 
     @property
     def period(self) -> float:

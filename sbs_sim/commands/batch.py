@@ -124,10 +124,11 @@ def _print_batch(batch: "Batch") -> None:
     whole = len(batch.cases) - len(batch.failed)
     print(f"{len(batch.cases)} flights of {batch.cases[0].aircraft.name}, {whole} of them over {batch.time[-1]:g} s")
     rows = []
-    for name, values in quantities(batch).items():
+    for name, values in quantities(batch).items() if whole else ():
         found = percentiles(values, SHARES)
         rows.append([name, *(fixed(value, 3) for value in (found[2, 0], *found[:, -1]))])
-    print_table(["", "start, 50 %", *(f"end, {share:g} %" for share in SHARES)], rows)
+    if rows:
+        print_table(["", "start, 50 %", *(f"end, {share:g} %" for share in SHARES)], rows)
     for text, count in Counter(line for lines in batch.warnings for line in lines).most_common():
         print(f"{OUTSIDE} in {count} flights: {text}")
     for i in batch.failed[:LISTED]:

@@ -67,7 +67,7 @@ def _sweep_row(value: float, point: "SweepPoint", numbers: int) -> list[str]:
         return [f"{value:.6g}", *["–"] * numbers, "", point.error or ""]
     controls = zip(point.trim.controls.tolist(), point.trim.control_units, strict=True)
     angles = [*np.degrees([point.trim.pitch, point.trim.roll]), *(shown(angle, unit)[0] for angle, unit in controls)]
-    growing = [mode.name for mode in point.model.modes if mode.pole.real > 0.0] if point.model else []
+    growing = [mode.name for mode in point.model.modes if mode.is_growing] if point.model else []
     remarks = [*([point.error] if point.error else []), *point.trim.beyond_limits, *point.warnings]
     cells = [*(_fixed(angle, 3) for angle in angles), _fixed(point.trim.power.sum(), 1)]
     return [f"{value:.6g}", *cells, "; ".join(growing), "; ".join(remarks)]

@@ -10,7 +10,7 @@ from helpers import build
 
 from sbs_sim import Aircraft, linearize, sweep, trim
 from sbs_sim.analysis.linear_model import growing_rotor_modes_text
-from sbs_sim.analysis.modes import first_matrix_modes, modes
+from sbs_sim.analysis.modes import Mode, first_matrix_modes, modes
 from sbs_sim.model.state import LINEAR_BODY_NAMES, StateLayout, part_of
 
 BODY_MODES = ["short period", "phugoid", "heave", "roll", "Dutch roll", "spiral"]
@@ -285,6 +285,16 @@ def test_heave_and_yaw_may_oscillate_together():
 
 
 # -- names of the rotors' modes --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_neutral_mode_neither_halves_nor_doubles(sign):
+    """A flap mode without air in between has a damping of rounding: no time is as long as this says."""
+    none, some = (Mode("flap", complex(sign * real, 27.8), np.ones(1), np.ones(1)) for real in (1e-15, 1e-3))
+    assert (none.time_to_half, none.time_to_double, none.is_growing) == (math.inf, math.inf, False)
+    times = some.time_to_double, some.time_to_half
+    assert sorted(times) == [pytest.approx(1e3 * math.log(2.0)), math.inf]
+    assert math.isfinite(times[0]) is some.is_growing is (sign > 0)
 
 
 def test_poles_of_a_model_that_does_not_oscillate_are_complex_numbers_too():

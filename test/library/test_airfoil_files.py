@@ -344,6 +344,7 @@ def test_held_values_stay_to_90_deg():
 
 BAD = {
     "no airfoil": ("hello\n<b>x</b>\n", ":1: 'hello' begins no airfoil file, allowed are C81 tables,"),
+    "an empty file": ("\n \n", ": the file is empty, must have airfoil data"),
     "a short C81 file": (C81.rpartition("\n")[0], ":13: the file ends where 3 more numbers must follow"),
     "a C81 field": (C81.replace("-0.2900", " 0.2x00"), ":6: field 6 '0.2x00' must be a finite number"),
     "Mach numbers that fall": (
@@ -414,7 +415,7 @@ def test_polars_that_do_not_fit_together_are_refused(tmp_path):
     )
     with pytest.raises(AirfoilError, match="at several Reynolds and several Mach numbers, allowed is one"):
         table_of("w", polars(one, other), None, 10.0)
-    with pytest.raises(AirfoilError, match="must have one Reynolds number"):
+    with pytest.raises(AirfoilError, match=r"has Reynolds numbers 50000, .*: choose one of them \(--reynolds\)"):
         c81_text(read_table(AIRFOILS / "naca0015.csv", 10.0), "x")
     with pytest.raises(AirfoilError, match="between that of a plate"):
         table_of("w", polars(one), "montgomerie", 10.0)  # its lift is on the line
@@ -436,5 +437,8 @@ def test_the_command_tells_what_it_does_and_writes_what_aircraft_take(tmp_path):
     command = [sys.executable, str(EXECUTABLE), "wing.csv", "--out", "wing.c81"]
     refused = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
     assert (refused.returncode, refused.stdout) == (1, "")
-    assert refused.stderr == "wing: a C81 table is over the Mach number, must have one Reynolds number (--reynolds)\n"
+    assert refused.stderr == (
+        "wing: a C81 table is over the Mach number, the table has Reynolds numbers 200000, 1000000: choose one of them"
+        " (--reynolds)\n"
+    )
     assert not (tmp_path / "wing.c81").exists()

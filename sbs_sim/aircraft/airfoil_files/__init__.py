@@ -91,7 +91,9 @@ def read_airfoil(path: str | Path) -> AirfoilData:
     for is_of_kind, read in READERS:
         if is_of_kind(lines):
             return read(path, lines)
-    first = next((line for line in lines if line.strip()), "")
+    first = next((line for line in lines if line.strip()), None)
+    if first is None:
+        raise AirfoilError(f"{path}: the file is empty, must have airfoil data")
     raise AirfoilError(
         f"{path}:1: {plain(first)!r} begins no airfoil file, allowed are C81 tables, polars of XFOIL or XFLR5,"
         " AeroDyn airfoil files, and CSV with the columns alpha_deg, cl and cd"

@@ -181,8 +181,10 @@ def c81_text(table: AirfoilTable, name: str) -> tuple[str, tuple[float, float]]:
         A table over several Reynolds numbers, or over more than 99 Mach numbers.
     """
     if table.axis != "mach" and len(table.numbers) > 1:
+        found = ", ".join(f"{number:.10g}" for number in table.numbers)
         raise AirfoilError(
-            f"{table.name}: a C81 table is over the Mach number, must have one Reynolds number (--reynolds)"
+            f"{table.name}: a C81 table is over the Mach number, the table has Reynolds numbers {found}: choose one of"
+            " them (--reynolds)"
         )
     single = len(table.numbers) == 1
     mach = np.array([0.0, 1.0]) if single else table.numbers

@@ -59,6 +59,21 @@ class Floquet(ByContent):
         return np.abs(self.exponents - self.poles) / np.maximum(np.abs(self.poles), np.finfo(float).tiny)
 
 
+def checked_period(aircraft: Aircraft) -> tuple[float, list[int]]:
+    """Common period as `common_period` has it, of an aircraft to which Floquet's method applies.
+
+    Raises
+    ------
+    LinearizationError
+        A stand, drives, or rotors whose blade passages have no common period.
+    """
+    if aircraft.body.is_stand:
+        raise LinearizationError("body.stand: allowed is none; IsolatedRotor.exponents has those of a rotor on a stand")
+    if aircraft.drives:
+        raise LinearizationError("drives: allowed are rotors of constant speed, of which the period is known")
+    return common_period(aircraft)
+
+
 def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Floquet:
     """Integrate the periodic linear model over one period.
 
@@ -79,14 +94,10 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
     LinearizationError
         A count out of range, rotors whose blade passages have no common period, or a stand.
     """
-    if aircraft.body.is_stand:
-        raise LinearizationError("body.stand: allowed is none; IsolatedRotor.exponents has those of a rotor on a stand")
+    period, _ = checked_period(aircraft)
     least, most = AZIMUTH_COUNTS
     if not least <= azimuth_count <= most or azimuth_count % 2:
         raise LinearizationError(f"azimuth_count = {azimuth_count}: allowed are even numbers from {least} to {most}")
-    if aircraft.drives:
-        raise LinearizationError("drives: allowed are rotors of constant speed, of which the period is known")
-    period, _ = common_period(aircraft)
     times = period * np.arange(azimuth_count) / azimuth_count
     psi = times[:, None] * np.array([rotor.speed for rotor in aircraft.rotors])
     used = np.array([i for i in used_states(point) if point.state_names[i] not in aircraft.locked_names])

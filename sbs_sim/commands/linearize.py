@@ -88,6 +88,10 @@ def _work(arguments: argparse.Namespace) -> None:
     check_target(arguments.out, ENCODERS)
     check_target(arguments.json)
     craft = aircraft(arguments)
+    if arguments.floquet:
+        from sbs_sim.analysis.floquet import checked_period
+
+        checked_period(craft)  # before the work
     point = solve_trim(craft, *flight(arguments), guess=guess(arguments, craft))
     wants_model = (
         arguments.out or arguments.json or arguments.participation or arguments.derivatives or arguments.matrices

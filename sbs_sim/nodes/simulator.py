@@ -16,6 +16,7 @@ from std_srvs.srv import SetBool
 
 from sbs_msgs.msg import SwashplateArray
 from sbs_msgs.srv import EngineFailure, Reset, SetWind, Step
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError, SimulationError, TrimError
@@ -218,7 +219,8 @@ class Simulator(Component):
         self, request: EngineFailure.Request, response: EngineFailure.Response
     ) -> EngineFailure.Response:
         def fail() -> None:
-            self.loop.fail_engine(request.drive, request.failure)
+            share = checks.number("failure", request.failure, 0.0, 1.0, "", SimulationError)
+            self.loop.fail_engine(request.drive, share)
 
         return self.answer(response, fail, f"engine of drive {request.drive} set", request)
 

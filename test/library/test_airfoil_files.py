@@ -421,6 +421,17 @@ def test_polars_that_do_not_fit_together_are_refused(tmp_path):
         table_of("w", polars(one), "montgomerie", 10.0)  # its lift is on the line
 
 
+def test_what_holds_for_every_polar_is_said_once(tmp_path):
+    made = write(tmp_path, "a.c81", c81_text(read_table(AIRFOILS / "sc1095r8.csv", 10.0), "sc1095r8")[0])
+    remarks = import_airfoil([made])[2]
+    assert remarks[1:] == ["all polars: gaps between angles filled on the lines between the points"]
+    some = [polars(xfoil(tmp_path, re, last, f"{last}.txt"))[0] for re, last in ((2e5, 10), (1e6, 10), (2e6, 14))]
+    assert "all polars: extended below -8 and above 10 deg by viterna" in table_of("w", some[:2], "viterna", 10.0)[1]
+    ends = [remark for remark in table_of("w", some, "viterna", 10.0)[1] if "extended" in remark]
+    assert len(ends) == 3
+    assert not any(remark.startswith("all polars") for remark in ends)
+
+
 # --- the command ------------------------------------------------------------------------------------
 
 

@@ -145,6 +145,12 @@ def test_trim_of_a_file_with_unequal_rotors():
 # -- linearize -------------------------------------------------------------------------------------------------------
 
 
+def test_an_aircraft_without_a_period_is_refused_before_the_work():
+    refused = call("linearize", "--aircraft", "quadrotor", "--floquet")
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert refused.stderr == "drives: allowed are rotors of constant speed, of which the period is known\n"
+
+
 def test_linearize_prints_modes(sbs, tmp_path):
     text = output("linearize", "--airspeed", 10, "--export", tmp_path / "model.npz", "--json", tmp_path / "model.json")
     model = linearize(sbs, airspeed=10.0)

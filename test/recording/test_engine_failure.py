@@ -44,7 +44,7 @@ def test_an_engine_failure_comes_again_bit_for_bit(tmp_path):
         assert (refused.success, refused.message) == (False, "engine of drive 2: allowed are 1")
         refused = client.call(EngineFailure, "engine_failure", failure=-0.5)
         assert not refused.success
-        assert refused.message.startswith("share = -0.5: allowed are 0 to 1")
+        assert refused.message.startswith("failure = -0.5: allowed are 0 to 1")
         assert client.call(EngineFailure, "engine_failure", failure=0.5).success
         assert client.call(EngineFailure, "engine_failure").success
         slower = client.next("rotors", lambda message: message.rotors[0].speed < 0.9 * point["Omega(1)"])

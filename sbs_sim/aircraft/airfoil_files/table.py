@@ -77,7 +77,17 @@ def table_of(
     half = half_turn(np.radians(angles))
     alpha = np.rint(angles / 180 * half) * (np.pi / half)
     cl, cd = np.array([polar.cl for polar in ordered]), np.array([polar.cd for polar in ordered])
-    return AirfoilTable(name, numbers, alpha, cl, cd, axis=axis), list(dict.fromkeys(remarks))
+    return AirfoilTable(name, numbers, alpha, cl, cd, axis=axis), _shared(remarks, [polar.number for polar in ordered])
+
+
+def _shared(remarks: list[str], numbers: list[str]) -> list[str]:
+    """Remarks without repetition: one that every polar has is said once."""
+    found = dict[str, None]()
+    for remark in remarks:
+        start, _, text = remark.partition(": ")
+        is_of_all = len(numbers) > 1 and all(f"{number}: {text}" in remarks for number in numbers)
+        found[f"all polars: {text}" if is_of_all and start in numbers else remark] = None
+    return list(found)
 
 
 def _ordered(polars: Sequence[Polar], axis: str | None) -> tuple[str, list[Polar]]:

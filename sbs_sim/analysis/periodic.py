@@ -110,11 +110,13 @@ class Period:
 
     def flown(self, states: Array, swashplates: Array) -> tuple[Array, Array, Array]:
         """States after a period, those at the beginning of every step (steps, m, size), mean loads (m, n_rotors, 8)."""
+        commands = np.zeros((len(states), S.ROW * len(self.aircraft.rows)))  # a rotor alone has none of surfaces
+        commands[:, : swashplates.shape[1]] = swashplates
         engine, ends, ways, means = self._engine(), [], [], []
         for first in range(0, len(states), engine.n):
             part = slice(first, first + engine.n)
             count = len(states[part])
-            end, way, loads = self._side_by_side(engine, list(states[part]), list(swashplates[part]))
+            end, way, loads = self._side_by_side(engine, list(states[part]), list(commands[part]))
             ends.append(end.T[:count])
             ways.append(way[:, :, :count].transpose(0, 2, 1))
             means.append(loads.T[:count])

@@ -103,7 +103,7 @@ def paths(schema: dict[str, Any], path: str = "") -> Iterator[str]:
     if "properties" in schema:
         for key, part in schema["properties"].items():
             yield from paths(part, f"{path}.{key}".lstrip("."))
-    elif path in ("body.surfaces", "body.fuselage", "drives"):  # an aircraft has them or not, and names them
+    elif path in ("body.surfaces", "body.fuselage", "drives", "rotors.schedule"):  # there are some or none
         yield path
     elif path == "controls":  # the names are the file's: those of the aircraft in the repository
         yield from (f"{path}.{name}.range_deg" for name in CONTROL_NAMES)

@@ -26,7 +26,9 @@ from sbs_msgs.msg import (
     InflowArray,
     RotorState,
     RotorStateArray,
+    ScheduledControl,
     SimulationStatus,
+    SurfaceCommand,
     Swashplate,
     SwashplateArray,
     WorkingState,
@@ -89,7 +91,8 @@ def swashplate_array(message: SwashplateArray) -> Array:
     """Swashplate angles [rad], shape (n_rows, 3), see `Aircraft.mix`."""
     angles = [[getattr(rotor, name) for name in S.SWASHPLATE_NAMES] for rotor in message.rotors]
     angles += [[*(getattr(drive, name) for name in S.COMMAND_NAMES), 0.0] for drive in message.drives]
-    angles += [[value, 0.0, 0.0] for value in (*message.incidence, *message.scheduled)]
+    single = [*(surface.incidence for surface in message.surfaces), *(control.value for control in message.scheduled)]
+    angles += [[value, 0.0, 0.0] for value in single]
     return np.array(angles, dtype=float).reshape(-1, S.ROW)
 
 
@@ -99,12 +102,20 @@ def swashplate_messages(angles: Array) -> list[Swashplate]:
 
 
 def command_fields(aircraft: Aircraft, rows: Array) -> dict[str, Any]:
-    """Fields `drives`, `incidence` and `scheduled` of a message, of commands of shape (n_rows, 3)."""
+    """Fields `drives`, `surfaces` and `scheduled` of a message, of commands of shape (n_rows, 3).
+
+    All are lists of messages: rclpy writes bytes behind a message that ends in an empty array of float64, which other
+    readers of logs refuse.
+    """
     first, behind = len(aircraft.rotors), len(aircraft.rotors) + len(aircraft.commanded_drives)
     last = behind + len(aircraft.commanded_surfaces)
     drives = [DriveCommand(**dict(zip(S.COMMAND_NAMES, row, strict=False))) for row in rows[first:behind].tolist()]
-    single = {"incidence": rows[behind:last, 0], "scheduled": rows[last:, 0]}
-    return {"drives": drives, **{name: float64_array(np.ascontiguousarray(part)) for name, part in single.items()}}
+    surfaces = [SurfaceCommand(incidence=value) for value in rows[behind:last, 0].tolist()]
+    return {
+        "drives": drives,
+        "surfaces": surfaces,
+        "scheduled": [ScheduledControl(value=value) for value in rows[last:, 0].tolist()],
+    }
 
 
 def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:

@@ -90,12 +90,15 @@ def test_jacobians_are_the_same_for_any_number_of_azimuths(model, point, count):
 
 
 def test_average_is_the_mean_over_the_azimuths(model, point):
-    """Configuration k of N has the first blade of a rotor at the share k/N of the way to the next blade."""
+    """Configuration k of N has the first blade at the share k/N of the way to where the rotor is the same again.
+
+    That is the next blade of three, and the one after the next of four, for the differential coordinate.
+    """
     x, swash, count = model.layout.from_linear(point[:-4]), model.aircraft.mix(point[-4:]), 3
     rates, loads = [], []
     for k in range(count):
-        psi = [2 * np.pi * k / (blades * count) for blades in (3, 4)]
-        np.testing.assert_allclose(azimuths((3, 4), count)[k], psi, rtol=1e-15)
+        psi = [2 * np.pi * k / (passages * count) for passages in (3, 2)]
+        np.testing.assert_allclose(azimuths((3, 2), count)[k], psi, rtol=1e-15)
         rates.append(model.derivative(x, swash, psi))
         loads.append(model.loads.copy())
     found, found_loads = model.averaged(x, swash, count)

@@ -234,9 +234,13 @@ def model_numbers(aircraft):
 
 
 def is_finite_model(aircraft):
-    """Whether all numbers of the compiled model are; Reynolds numbers that a table does not have stand as infinity."""
+    """Whether all numbers of the compiled model are; ends of airfoil tables may be infinite.
+
+    They are where a table has fewer Reynolds numbers than another one, or is for all of them.
+    """
     numbers = model_numbers(aircraft)
-    return not np.isnan(numbers.pop("knots")).any() and all(np.isfinite(part).all() for part in numbers.values())
+    ends = [numbers.pop(name) for name in ("knots", "blades.max_number", "stall")]
+    return not any(np.isnan(part).any() for part in ends) and all(np.isfinite(part).all() for part in numbers.values())
 
 
 def mirrored_data(data):

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sbs_sim.content import ByContent
 from sbs_sim.errors import AirfoilError
 from sbs_sim.model.airfoil import NUMBER_NAMES, POLAR_COLUMNS, Array
 
@@ -18,8 +19,8 @@ TEXT_LENGTH = 60
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([ed][+-]?\d+)?", re.IGNORECASE | re.ASCII)
 
 
-@dataclass(frozen=True)
-class Polar:
+@dataclass(frozen=True, eq=False)
+class Polar(ByContent):
     """Lift and drag over the angle of attack as a file has them.
 
     Attributes

@@ -11,6 +11,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
 from sbs_sim.analysis.validation.comparison import Aim, Case, Row, compared
 from sbs_sim.analysis.validation.published import craft, data
+from sbs_sim.content import ByContent
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.simulate import simulate
 from sbs_sim.flight.trim_point import Fidelity
@@ -53,7 +54,7 @@ REMARKS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Autorotation:
+class Autorotation(ByContent):
     """A rotor that the wind turns: means over some revolutions.
 
     Attributes

@@ -194,7 +194,7 @@ class IsolatedRotor:
             start = replace(start, state=of_substitute(self.aircraft, start.state, speeds), places=mean_rotor.places)
         found = mean_rotor.steady(swashplate, **given, start=start)
         begin = at_azimuths(self.aircraft, found.state, np.zeros((1, 1)), speeds)[0]
-        period = Period(self.aircraft, self.fidelity, _held)
+        period, commands = Period(self.aircraft, self.fidelity, _held), self._commands(found.swashplate)
 
         def states(values: Array) -> Array:
             made = np.repeat(begin[np.newaxis], len(values), axis=0)
@@ -203,18 +203,19 @@ class IsolatedRotor:
 
         def residuals(values: Array) -> Array:
             starts = states(values)
-            return period.rotor_balance(starts, period.ends(starts, np.repeat([found.swashplate], len(values), axis=0)))
+            return period.rotor_balance(starts, period.ends(starts, np.repeat([commands], len(values), axis=0)))
 
         values = solved(residuals, len(period.places), self.rotor.name)[np.newaxis]
         x = states(values)[0]
-        loads = period.flown(x[np.newaxis], found.swashplate[np.newaxis])[2][0, 0]
+        loads = period.flown(x[np.newaxis], commands[np.newaxis])[2][0, 0]
         return self._result(x, found.swashplate, loads, float(np.abs(residuals(values)).max()))
 
     def _along(self, point: RotorPoint, psi: Array) -> list[Array]:
         """States of a steady motion at equal steps of the azimuth over a revolution, shape (m, 1)."""
         if self._mean_rotor is None:
             return [point.state] * len(psi)
-        return list(Period(self.aircraft, self.fidelity, _held, len(psi)).orbit(point.state, point.swashplate))
+        period = Period(self.aircraft, self.fidelity, _held, len(psi))
+        return list(period.orbit(point.state, self._commands(point.swashplate)))
 
     def _flight(self, airspeed: float, climb_rate: float, pitch: float) -> Array:
         """State of the hub with the rotor's states where the search begins."""
@@ -254,12 +255,17 @@ class IsolatedRotor:
         rates, loads = self._rates([x] * len(self._azimuths), swash, self._azimuths)
         return rates.mean(axis=0), loads.mean(axis=0)
 
+    def _commands(self, swash: Array) -> Array:
+        """All commands of the aircraft, with a swashplate; those to surfaces are zero."""
+        commands = np.zeros(S.ROW * len(self.aircraft.rows))
+        commands[: len(swash)] = swash
+        return commands
+
     def _rates(self, states: Sequence[Array], swash: Array, psi: Array) -> tuple[Array, Array]:
         """Rates (m, size) and loads (m, 8) of states at as many azimuths; the hub accelerates on a stand alone."""
         engine = points_engine(self.aircraft.arranged(self.fidelity.lead_lag, self.fidelity.cyclic_inflow, "points"))
         rates, loads = np.empty((len(states), self.layout.size)), np.empty((len(states), R.LOAD_SIZE))
-        commands = np.zeros(S.ROW * len(self.aircraft.rows))  # those to surfaces are zero
-        commands[: len(swash)] = swash
+        commands = self._commands(swash)
         angles, still_air, left = engine.lanes([commands]), engine.memory(3), engine.memory(6)
         for first in range(0, len(states), engine.n):
             part = slice(first, min(first + engine.n, len(states)))

@@ -46,8 +46,7 @@ def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
         There is none of at most 60 passages.
     """
     blades = np.array([rotor.blades for rotor in aircraft.rotors])
-    equal = np.array([rotor.has_equal_blades for rotor in aircraft.rotors])
-    each = np.where(equal, np.where(blades % 2 == 0, 2, 1), blades)
+    each = blades // np.array(aircraft.passages)
     passage = each * 2.0 * math.pi / (blades * np.array([rotor.speed for rotor in aircraft.rotors]))
     for count in range(1, MAX_PASSAGES + 1):
         period = count * float(passage.max())
@@ -105,18 +104,16 @@ class Period:
         self.places, self.scales = _rotor_states(aircraft, fidelity)
 
     def ends(self, states: Array, swashplates: Array) -> Array:
-        """States after a period, shape (m, size), of states (m, size) and swashplate angles (m, 3 n_rotors)."""
+        """States after a period, shape (m, size), of states (m, size) and commands (m, 3 n_rows)."""
         return self.flown(states, swashplates)[0]
 
     def flown(self, states: Array, swashplates: Array) -> tuple[Array, Array, Array]:
         """States after a period, those at the beginning of every step (steps, m, size), mean loads (m, n_rotors, 8)."""
-        commands = np.zeros((len(states), S.ROW * len(self.aircraft.rows)))  # a rotor alone has none of surfaces
-        commands[:, : swashplates.shape[1]] = swashplates
         engine, ends, ways, means = self._engine(), [], [], []
         for first in range(0, len(states), engine.n):
             part = slice(first, first + engine.n)
             count = len(states[part])
-            end, way, loads = self._side_by_side(engine, list(states[part]), list(commands[part]))
+            end, way, loads = self._side_by_side(engine, list(states[part]), list(swashplates[part]))
             ends.append(end.T[:count])
             ways.append(way[:, :, :count].transpose(0, 2, 1))
             means.append(loads.T[:count])

@@ -344,10 +344,8 @@ class Aircraft(Description):
     def scheduled(self, rows: ArrayLike, airspeed: float) -> Array:
         """Commands of `mix` with what the schedules of the rotors add at an airspeed [m/s], shape (n_rows, 3)."""
         given = np.asarray(rows, dtype=float)
-        found = given.copy()
-        controls = dict(
-            zip(scheduled_controls(self), given[len(given) - len(scheduled_controls(self)) :, 0], strict=True)
-        )
+        found, names = given.copy(), scheduled_controls(self)
+        controls = dict(zip(names, given[len(given) - len(names) :, 0], strict=True))
         for j, rotor in enumerate(self.rotors):
             for entry in rotor.schedule:
                 share = np.interp(airspeed, entry.airspeed, entry.values)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.description import Drive
-from sbs_sim.aircraft.model_records import gear
+from sbs_sim.aircraft.model_records import drive_of, gear
 from sbs_sim.model import state as S
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def _is_held(aircraft: Aircraft, drive: int) -> bool:
 
 def _driven(aircraft: Aircraft, drive: int) -> list[int]:
     """Indices of the rotors of a drive."""
-    return [j for j, rotor in enumerate(aircraft.rotors) if rotor.name in aircraft.drives[drive].rotors]
+    return [j for j, rotor in enumerate(aircraft.rotors) if drive_of(aircraft, rotor) == drive]
 
 
 def _torque(aircraft: Aircraft, drive: int, nominal: tuple[Nominal, ...]) -> float:

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import export
+from sbs_sim.analysis.bandwidth import Bandwidth, bandwidth
 from sbs_sim.analysis.control_effects import ControlEffect, control_effects
+from sbs_sim.analysis.frequency_response import FrequencyResponse, frequency_response
 from sbs_sim.analysis.modes import Mode, modes
 from sbs_sim.content import ByContent
 from sbs_sim.errors import ExportError, LinearizationError
@@ -196,6 +198,39 @@ class LinearModel(ByContent):
             for column, control in enumerate(model.control_names):
                 found[f"{symbol}_{control}"] = float(model.b[body[row], column])
         return found
+
+    def frequency_response(
+        self, input_name: str, output_name: str, frequencies: Any = None, delay: float = 0.0
+    ) -> FrequencyResponse:
+        """Gain and phase of an output or state over frequency; see `sbs_sim.analysis.frequency_response`.
+
+        Parameters
+        ----------
+        input_name, output_name : str
+            A control, and an output or state.
+        frequencies : array_like, optional
+            Rising [rad/s]; by default 200 that show all poles.
+        delay : float
+            Of sensors, computers and the like [s].
+
+        Raises
+        ------
+        LinearizationError
+            A name that the model does not have, or frequencies or a delay out of range.
+        """
+        return frequency_response(self, input_name, output_name, frequencies, delay)
+
+    def bandwidth(
+        self, input_name: str, output_name: str, delay: float = 0.0, is_rate_command: bool = True
+    ) -> Bandwidth:
+        """Bandwidth and phase delay of an attitude after ADS-33E-PRF; see `sbs_sim.analysis.bandwidth`.
+
+        Raises
+        ------
+        LinearizationError
+            A name that the model does not have, a delay out of range, or an output that the control does not move.
+        """
+        return bandwidth(self, input_name, output_name, delay, is_rate_command)
 
     def save(self, path: str | Path) -> None:
         """Write the model to a file of the kind that its suffix says.

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from sbs_sim.analysis.frequency_response import Transfer
 from sbs_sim.content import ByContent
@@ -165,6 +164,8 @@ def _search(transfer: Transfer) -> tuple[Array, int]:
 
 def _root(function: Callable[[float], float], level: float, low: float, high: float) -> float:
     """Frequency between two at which a function has a value."""
+    from scipy.optimize import brentq  # here: it takes a quarter of a second, and few need it
+
     return float(brentq(lambda frequency: function(frequency) - level, low, high, xtol=1e-12, rtol=1e-12))
 
 

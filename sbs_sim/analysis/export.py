@@ -143,8 +143,8 @@ ENCODERS: dict[str, Callable[["LinearModel"], bytes]] = {".npz": _npz, ".mat": _
 def sweep_to_csv(sweep: "Sweep") -> str:
     """Table of a sweep: one row for each point, SI units and radians; cells are empty where a point has none.
 
-    Columns: the parameter, attitude, controls, thrust, torque and power of each rotor, the states, the poles of the
-    modes by name, where the model does not hold, the error.
+    Columns: the parameter, attitude, controls, thrust, torque, power and speed of each rotor, the states, the poles of
+    the modes by name, where the model does not hold, the error.
     """
     columns = {f"{sweep.parameter} [{sweep.unit(sweep.parameter)}]": sweep.values}
     for name in sweep.names:

@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 CONDITIONS = {"airspeed": "m/s", "climb_rate": "m/s", "sideslip": "rad", "turn_rate": "rad/s"}
-ROTOR_LOADS = {"thrust": "N", "torque": "N m", "power": "W"}
+ROTOR_LOADS = {"thrust": "N", "torque": "N m", "power": "W", "rotor_speed": "rad/s"}
 ATTITUDE = dict.fromkeys(("pitch", "roll"), "rad")
 QUANTITIES = {  # of a trim, beside attitude, controls and states
     **ROTOR_LOADS,
@@ -105,6 +105,11 @@ class Sweep:
         unit = self.unit(self.parameter)
         return shown(self.values, unit) if self.parameter in CONDITIONS else (self.values, unit)
 
+    @property
+    def has_free_speeds(self) -> bool:
+        """Whether the speed of a rotor is a state, of a drive."""
+        return any(f"{S.SPEED}(1)" in point.trim.state_names for point in self.points if point.trim is not None)
+
     @cached_property
     def failed(self) -> tuple[SweepPoint, ...]:
         """Points with an error."""
@@ -144,11 +149,11 @@ class Sweep:
         ----------
         name : str
             "pitch", "roll" [rad]; "residual", "iterations"; a linear state in its unit, "theta" and "phi" among them;
-            a control, "psi", "V", "thrust", "torque", "power" as in `TrimPoint`.
+            a control, "psi", "V", "thrust", "torque", "power", "rotor_speed" as in `TrimPoint`.
 
         Returns
         -------
-        ndarray, shape (n_points,), of thrust, torque and power (n_points, n_rotors)
+        ndarray, shape (n_points,), of thrust, torque, power and rotor speed (n_points, n_rotors)
 
         Raises
         ------

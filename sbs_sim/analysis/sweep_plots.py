@@ -24,7 +24,7 @@ from sbs_sim.model.state import part_of
 from sbs_sim.output.files import write
 from sbs_sim.output.plot_labels import PLAIN, name_poles
 from sbs_sim.output.plot_style import COLOURS, DASHES
-from sbs_sim.output.units import label, shown
+from sbs_sim.output.units import RPM, label, shown
 
 Array = NDArray[np.float64]
 
@@ -91,10 +91,11 @@ def _parameter_label(sweep: Sweep) -> str:
 
 
 def trim_figure(sweep: Sweep) -> Figure:
-    """Attitude, controls, thrust and power over the parameter; a cross marks where there is no trim."""
-    figure = Figure(figsize=(10.0, 7.5), layout="constrained")
+    """Attitude, controls, thrust, power and free rotor speeds over the parameter; a cross marks where no trim is."""
+    rows = 3 if sweep.has_free_speeds else 2
+    figure = Figure(figsize=(10.0, 3.75 * rows), layout="constrained")
     FigureCanvasAgg(figure)
-    (attitude, controls), (thrust, power) = figure.subplots(2, 2)
+    (attitude, controls), (thrust, power), *more = figure.subplots(rows, 2)
     _curves(attitude, sweep, {name: np.degrees(sweep[name]) for name in ("pitch", "roll")}, "attitude [deg]", MIN_ANGLE)
     units = set(sweep.controls.values())
     common = len(units) == 1  # else each curve has its own
@@ -110,6 +111,10 @@ def trim_figure(sweep: Sweep) -> Figure:
     if len(powers) > 1:
         powers["all rotors"] = sweep["power"].sum(axis=1)
     _curves(power, sweep, powers, "shaft power [W]", MIN_SHARE * _largest(sweep["power"]))
+    for speed, unused in more:
+        unused.set_axis_off()
+        speeds = sweep["rotor_speed"] * RPM
+        _curves(speed, sweep, _by_rotor(speeds), "rotor speed [rpm]", MIN_SHARE * _largest(speeds))
     return figure
 
 

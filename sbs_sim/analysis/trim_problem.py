@@ -22,7 +22,7 @@ from sbs_sim.model.average import azimuths
 from sbs_sim.model.balance import trim_residuals, trim_sides
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
-from sbs_sim.output.units import shown
+from sbs_sim.output.units import RPM, shown
 
 Array = NDArray[np.float64]
 
@@ -42,6 +42,7 @@ BODY_BALANCES = (
 )
 DRIVE_BALANCES = {S.SPEED: "torque of a drive", S.ENGINE_TORQUE: "throttle", S.GOVERNOR: "speed of a governor"}
 DROOP = 1e-6  # share of the speed that a governor may lack
+MIN_SPEED = 0.2  # of a rotor's own below which it hardly turns: centrifugal force is 4 % of what it is then
 HALF = 0.5  # of torque and throttle: where trims begin
 
 
@@ -234,6 +235,7 @@ class TrimProblem:
             thrust=self.loads[:, R.THRUST].copy(),
             torque=torque,
             power=torque * speeds,
+            rotor_speed=np.array(speeds),
             residual=float(np.abs(residual).max()),
             method=method,
             iterations=iterations,
@@ -260,7 +262,17 @@ class TrimProblem:
         rows = engine.memory(engine.rotors, WORKING_SIZE)
         working_state(engine.model, engine.work, rows)
         unequal = (f"{rotor.name}: {UNEQUAL_BLADES}" for rotor in self.aircraft.rotors if not rotor.has_equal_blades)
-        return (*warnings(self.aircraft, rows[..., :count].mean(axis=-1)), *unequal, *self._droops(x, swash))
+        lines = warnings(self.aircraft, rows[..., :count].mean(axis=-1))
+        return (*lines, *unequal, *self._slow_rotors(x), *self._droops(x, swash))
+
+    def _slow_rotors(self, x: Array) -> list[str]:
+        """Rotors with drives that hardly turn, so that centrifugal force does not hold their blades, a line each."""
+        found = []
+        for rotor, speed in zip(self.aircraft.rotors, self.aircraft.rotor_speeds(x).tolist(), strict=True):
+            if abs(speed) < MIN_SPEED * rotor.speed:
+                rpm, full = (value * RPM for value in (speed, rotor.speed))
+                found.append(f"{rotor.name}: turns at {rpm:.3g} of {full:.4g} rpm, too slowly to hold its blades")
+        return found
 
     def _droops(self, x: Array, swash: Array) -> list[str]:
         """Governors that cannot hold their speed, a line each."""

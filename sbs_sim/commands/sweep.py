@@ -148,24 +148,29 @@ def _values(arguments: argparse.Namespace) -> list[float]:
 
 def _print_sweep(found: "Sweep") -> None:
     """One row for each point, and below the errors."""
-    from sbs_sim.output.units import label
+    import numpy as np
+
+    from sbs_sim.output.units import RPM, label
     from sbs_sim.output.units import shown as shown_values
 
     shown, unit = found.shown
     columns = {"pitch": "rad", "roll": "rad", **found.controls}
     angles = [shown_values(found[name], unit)[0] for name, unit in columns.items()]
     power = found["power"].sum(axis=1)
+    speeds = found["rotor_speed"] * RPM if found.has_free_speeds else np.empty((len(power), 0))
     rows = []
     for i, point in enumerate(found.points):
         row = [f"{shown[i]:.6g}"]
         if point.trim is None:
-            row += ["-"] * (len(angles) + 1) + ["no trim, see below"]
+            row += ["-"] * (len(angles) + speeds.shape[1] + 1) + ["no trim, see below"]
         else:
             row += [fixed(angle[i], 3) for angle in angles]
+            row += [fixed(speed, 1) for speed in speeds[i].tolist()]
             row += [fixed(power[i], 1), _growing(point)]
         rows.append(row)
     short = (label(name.removesuffix("_cyclic").removesuffix("_longitudinal"), unit) for name, unit in columns.items())
     headings = [f"{found.parameter} [{unit}]" if unit else found.parameter, *short]
+    headings += [f"rotor {j + 1} [rpm]" for j in range(speeds.shape[1])]
     print_table([*headings, "power [W]", "growing modes"], rows, left=(len(headings) + 1,))
     for value, point in zip(shown, found.points, strict=True):
         if point.error is not None:

@@ -1,7 +1,6 @@
 """`trim`: attitude, controls and loads of a steady flight."""
 
 import argparse
-import math
 from typing import TYPE_CHECKING
 
 from sbs_sim.commands.common import (
@@ -100,6 +99,7 @@ def _deflection_rows(point: "TrimPoint") -> list[list[str]]:
 def _rotor_rows(craft: "Aircraft", point: "TrimPoint") -> list[list[str]]:
     """Loads, swashplate, flap, lag and inflow; one column for each rotor."""
     from sbs_sim.model.state import SWASHPLATE_NAMES, part_of
+    from sbs_sim.output.units import RPM
 
     rows = [
         ["thrust [N]", *(fixed(value, 3) for value in point.thrust)],
@@ -107,8 +107,7 @@ def _rotor_rows(craft: "Aircraft", point: "TrimPoint") -> list[list[str]]:
         ["power [W]", *(fixed(value, 2) for value in point.power)],
     ]
     if craft.drives:
-        speeds = craft.rotor_speeds(craft.layout.from_linear(point.state))
-        rows.append(["speed [rpm]", *(fixed(speed * 30.0 / math.pi, 2) for speed in speeds)])
+        rows.append(["speed [rpm]", *(fixed(speed * RPM, 2) for speed in point.rotor_speed.tolist())])
     for name, angles in zip(SWASHPLATE_NAMES, point.swashplate[: len(craft.rotors)].T, strict=True):
         rows.append([f"{name} [deg]", *(fixed(angle * DEGREES, 4) for angle in angles)])
     families: dict[str, dict[str, list[str]]] = {"flap": {}, "lag": {}, "inflow": {}}

@@ -27,7 +27,7 @@ LIMITS = {
     "turn_rate": (3.0, "rad/s"),
 }
 MAX_AZIMUTH_COUNT = 1000
-ROTOR_LOADS = ("thrust", "torque", "power")
+ROTOR_LOADS = ("thrust", "torque", "power", "rotor_speed")
 
 
 @dataclass(frozen=True)
@@ -145,6 +145,8 @@ class TrimPoint(ByContent):
     state_names : tuple of str
     thrust, torque, power : ndarray, shape (n_rotors,)
         Mean aerodynamic thrust along the shaft [N], shaft torque [N m], shaft power [W].
+    rotor_speed : ndarray, shape (n_rotors,)
+        Speed of the rotors [rad/s]: that of the file, or with drives that of the trim.
     residual : float
         Largest scaled residual of the complete equations, whatever the method: accelerations over gravity, rotor and
         inflow rates over those of one revolution.
@@ -177,6 +179,7 @@ class TrimPoint(ByContent):
     thrust: Array
     torque: Array
     power: Array
+    rotor_speed: Array
     residual: float
     method: str
     iterations: int
@@ -211,11 +214,11 @@ class TrimPoint(ByContent):
         ----------
         name : str
             A state, "theta" and "phi" among them; a control [rad]; "psi", the heading, which is 0 [rad]; "V", the speed
-            relative to the air [m/s]; "thrust" [N], "torque" [N m], "power" [W].
+            relative to the air [m/s]; "thrust" [N], "torque" [N m], "power" [W], "rotor_speed" [rad/s].
 
         Returns
         -------
-        float, of thrust, torque and power ndarray of shape (n_rotors,)
+        float, of thrust, torque, power and rotor speed ndarray of shape (n_rotors,)
 
         Raises
         ------

@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 
+RPM = 30.0 / np.pi  # revolutions per minute in one rad/s
+
 
 def shown(values: Any, unit: str) -> tuple[Any, str]:
     """Values and their unit, with degrees in place of radians."""

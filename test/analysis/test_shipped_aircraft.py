@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from sbs_sim import Aircraft, linearize, trim
+from sbs_sim import Aircraft, linearize, sweep, trim
+from sbs_sim.analysis.export import sweep_to_csv
+from sbs_sim.analysis.sweep_plots import trim_figure
 
 
 @pytest.mark.parametrize("name", ["tandem", "coaxial"])
@@ -31,3 +33,27 @@ def test_it_flies_forward_within_its_ranges(name):
     assert cruise.beyond_limits == ()
     assert cruise.pitch < 0.0
     assert cruise.power.sum() < trim(Aircraft.load(name)).power.sum()
+
+
+def test_a_rotor_that_nothing_drives_is_reported():
+    """An autogiro in still air: its rotor all but stands, and no blade is held by centrifugal force."""
+    still = trim(Aircraft.load("pca2"))
+    (line,) = (line for line in still.warnings if "too slowly" in line)
+    assert line.startswith("rotor: turns at ")
+    assert line.endswith(" of 140 rpm, too slowly to hold its blades")
+    assert not any("too slowly" in line for line in trim(Aircraft.load("pca2"), 30.0).warnings)
+
+
+def test_a_sweep_shows_the_speed_of_a_free_rotor():
+    """An autogiro turns the faster the faster it flies, and its CSV and table say so."""
+    found = sweep(Aircraft.load("pca2"), "airspeed", [20.0, 30.0, 40.0], linear=False)
+    speeds = found["rotor_speed"][:, 0]
+    assert found.has_free_speeds
+    assert (np.diff(speeds) > 0.0).all()
+    np.testing.assert_allclose(speeds, found["Omega(1)"], rtol=1e-12)
+    header = sweep_to_csv(found).partition("\n")[0]
+    assert "rotor_speed(1) [rad/s]" in header
+    assert len(trim_figure(found).axes) == 6
+    fixed = sweep(Aircraft.load("tandem"), "airspeed", [0.0], linear=False)
+    assert not fixed.has_free_speeds
+    assert fixed["rotor_speed"].tolist() == [[rotor.speed for rotor in Aircraft.load("tandem").rotors]]

@@ -115,16 +115,17 @@ def test_hover_of_the_model_rotor(report):
 
 
 def test_thrust_in_hover_hangs_on_the_solidity_and_not_on_the_number_of_blades():
-    """Blades of another chord at the same solidity and Reynolds number: what the four stand for the two with."""
+    """Three blades of another chord at the same solidity and Reynolds number for the two of the rotor."""
     craft = Aircraft.load("caradonna_tung")
     three = {"rotors.blades": 3, "rotors.chord": {"root": 0.127, "tip": 0.127}}
-    three["environment.kinematic_viscosity"] = craft.environment.kinematic_viscosity * 4.0 / 3.0
+    three["environment.kinematic_viscosity"] = craft.environment.kinematic_viscosity * 2.0 / 3.0
     own, other = (
         IsolatedRotor(aircraft, Fidelity(lead_lag=False)).steady((0.14, 0.0, 0.0))
         for aircraft in (craft, craft.with_values(three))
     )
-    assert own.thrust_coefficient == pytest.approx(other.thrust_coefficient, rel=1e-6)
-    assert own.torque_coefficient == pytest.approx(other.torque_coefficient, rel=1e-6)
+    # the springs give way by less than 0.1 deg, more under the larger loads of two blades
+    assert own.thrust_coefficient == pytest.approx(other.thrust_coefficient, rel=1e-4)
+    assert own.torque_coefficient == pytest.approx(other.torque_coefficient, rel=2e-4)
 
 
 def test_losses_bring_the_thrust_of_two_blades_nearer(report):

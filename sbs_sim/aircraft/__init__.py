@@ -29,6 +29,7 @@ from sbs_sim.aircraft.paths import (
     instead_of,
     locations,
     mirrored,
+    path_of,
     replaced,
     separate,
     value_at,
@@ -192,7 +193,10 @@ class Aircraft(Description):
         try:
             return self._made_of(data, self.folder, self)
         except AircraftError as error:
-            raise AircraftError(_with_changes(plain, str(error))) from None
+            named = {
+                path_of(location): path for path in plain for location in locations(data, schema_of(type(self)), path)
+            }
+            raise AircraftError(_with_changes(plain, _as_given(str(error), named))) from None
 
     def __hash__(self) -> int:
         return hash((self.name, self.parameter_hash))
@@ -578,10 +582,19 @@ def _check_pair(pairs: dict[Location, tuple[str, Any]], location: Location, path
     pairs[location] = path, value
 
 
+def _as_given(error: str, named: Mapping[str, str]) -> str:
+    """Faults with the paths that were given in place of those of single rotors, each once."""
+    lines = []
+    for line in error.split("; "):
+        path, equals, rest = line.partition(" = ")
+        lines.append(f"{named.get(path, path)}{equals}{rest}")
+    return "; ".join(dict.fromkeys(lines))
+
+
 def _with_changes(values: Mapping[str, Any], error: str) -> str:
-    """Fault of a changed aircraft with the changes before it, where it does not name the only change itself."""
-    named = [path for path in values if error.startswith(f"{path} = ")]
-    if named and len(values) == 1:
+    """Fault of a changed aircraft with the changes before it, where it does not name all of them itself."""
+    named = {line.partition(" = ")[0] for line in error.split("; ")}
+    if named == set(values):
         return error
     changes = ", ".join(f"{path} = {checks.shown(value)}" for path, value in list(values.items())[:MAX_CHANGES_SHOWN])
     more = f" and {len(values) - MAX_CHANGES_SHOWN} more" if len(values) > MAX_CHANGES_SHOWN else ""

@@ -89,6 +89,14 @@ def _unknown(done: str, step: str | int, what: str, allowed: str) -> AircraftErr
     return AircraftError(f"{_joined(done, step)}: {what}allowed are {allowed}")
 
 
+def path_of(location: Location) -> str:
+    """Path of a location: "rotors[0].radius"."""
+    path = ""
+    for step in location:
+        path = _joined(path, step)
+    return path
+
+
 def value_at(data: Any, location: Location) -> Any:
     """Value at a location; None where an optional key is left out."""
     for step in location:

@@ -1190,12 +1190,9 @@ REFUSED_VALUES = {
         "rotors.blade_mass = 3.0: body.inertia without the blades = [[-4.942583, -0.001, -0.052],"
         " [-0.001, 1.235867, 0.0], [-0.052, 0.0, -3.9619]]: allowed is a positive definite matrix",
     ),
-    "out of range in every rotor": (
-        "rotors.tip_loss",
-        2,
-        "rotors.tip_loss = 2: rotors[0].tip_loss = 2: allowed is <= 1; rotors[1].tip_loss = 2: allowed is <= 1",
-    ),
-    "one name for all": ("rotors.name", "R", "rotors.name = 'R': rotors[1].name = 'R': used twice"),
+    "out of range in every rotor": ("rotors.tip_loss", 2, "rotors.tip_loss = 2: allowed is <= 1"),
+    "out of range in one rotor": ("rotors.MR2.tip_loss", 2, "rotors.MR2.tip_loss = 2: allowed is <= 1"),
+    "one name for all": ("rotors.name", "R", "rotors.name = 'R': used twice"),
     "unknown choice": ("options.coupling", "both", "options.coupling = 'both': allowed is one of complete, paper"),
     "number for a part": ("body", 3, "body = 3: allowed is a mapping of keys to values"),
 }

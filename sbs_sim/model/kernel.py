@@ -9,6 +9,7 @@ import contextlib
 import functools
 import gc
 import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -95,7 +96,15 @@ class _Entry(Compiler):
     def __init__(self, typing: Any, target: Any, library: Any, *others: Any) -> None:
         library = _EntryLibrary(target.codegen(), "entry")
         library.enable_object_caching()
+        _tell_who_waits()
         super().__init__(typing, target, library, *others)
+
+
+@functools.cache
+def _tell_who_waits() -> None:
+    """Say once, to a person at a terminal, why nothing happens for a while."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        print("sbs_sim: compiling for this kind of aircraft, once: some seconds, up to a minute", file=sys.stderr)
 
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -6,6 +6,7 @@ import sys
 import textwrap
 
 import pytest
+from terminal import on_a_terminal
 
 CODE = """
     import hashlib
@@ -106,3 +107,37 @@ def test_everything_works_without_the_compiler_too():
     assert reported == ["(None,) None ()"] * 2
     assert len(numbers[0]) > 1000
     assert numbers[1] == pytest.approx(numbers[0], rel=1e-6, abs=1e-6)
+
+
+COMPILING = """
+    import numpy as np
+    from sbs_sim.model.kernel import entry
+
+    @entry
+    def double(x):
+        for i in range(x.shape[0]):
+            x[i] *= 2.0
+
+    values = np.ones(2)
+    double(values)
+    double(np.ones((2, 2))[0])
+    print(values.tolist())
+"""
+
+
+def test_who_waits_for_the_compiler_is_told_so_once(tmp_path):
+    """A person at a terminal alone: programs that read stderr see nothing of it."""
+    path = tmp_path / "compiling.py"
+    path.write_text(textwrap.dedent(COMPILING), encoding="utf-8")
+    folder = tmp_path / "cache"
+    folder.mkdir(mode=0o700)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+    code, out, shown = on_a_terminal([sys.executable, str(path)], env=environment)
+    assert (code, out) == (0, "[2.0, 2.0]\n")
+    assert shown.count(b"sbs_sim: compiling for this kind of aircraft, once") == 1
+    again = on_a_terminal([sys.executable, str(path)], env=environment)
+    assert again == (0, out, b"")
+    os.truncate(path, 0)
+    path.write_text(textwrap.dedent(COMPILING) + "\n", encoding="utf-8")
+    piped = subprocess.run([sys.executable, str(path)], env=environment, capture_output=True, text=True, check=True)
+    assert (piped.stdout, piped.stderr) == (out, "")

@@ -13,6 +13,7 @@ from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
+from sbs_sim.output.warnings_text import joined
 
 SKY, EARTH, MARK = "#8fbbe0", "#b59a78", "#20262c"
 PIXELS_PER_DEGREE = 2.0
@@ -166,6 +167,7 @@ def _state_line(status: Status, source: str) -> str:
     lines = [f"<b>{escape(source)}</b> {doing}{late}"]
     if status.log:
         lines.append(f'<span style="color:#5c6670">recording {escape(Path(status.log).name)}</span>')
-    problems = (status.fault, status.log_state, *(f"outside the model's validity: {text}" for text in status.warnings))
+    outside = (f"outside the model's validity: {text}" for text in joined(status.warnings))
+    problems = (status.fault, status.log_state, *outside)
     lines += [f'<span style="color:#D55E00">{escape(text)}</span>' for text in problems if text]
     return f'<div style="margin-top:4px;line-height:1.4">{"<br>".join(lines)}</div>'

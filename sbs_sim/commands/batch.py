@@ -120,6 +120,7 @@ def _print_batch(batch: "Batch") -> None:
     """Percentiles at the start and at the end, and the flights that ended before."""
     from sbs_sim.analysis.batch import percentiles
     from sbs_sim.analysis.monte_carlo import SHARES, quantities
+    from sbs_sim.output.warnings_text import joined
 
     whole = len(batch.cases) - len(batch.failed)
     print(f"{len(batch.cases)} flights of {batch.cases[0].aircraft.name}, {whole} of them over {batch.time[-1]:g} s")
@@ -129,7 +130,7 @@ def _print_batch(batch: "Batch") -> None:
         rows.append([name, *(fixed(value, 3) for value in (found[2, 0], *found[:, -1]))])
     if rows:
         print_table(["", "start, 50 %", *(f"end, {share:g} %" for share in SHARES)], rows)
-    for text, count in Counter(line for lines in batch.warnings for line in lines).most_common():
+    for text, count in Counter(line for lines in batch.warnings for line in joined(lines)).most_common():
         print(f"{OUTSIDE} in {count} flights: {text}")
     for i in batch.failed[:LISTED]:
         print(f"flight {i} (seed {batch.cases[i].wind.turbulence_seed}): {batch.errors[i]}")

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from sbs_sim.errors import SbsError
 from sbs_sim.terminal.command_line import Parser, assignment
+from sbs_sim.terminal.progress import show_compiling
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
@@ -36,6 +37,7 @@ def execute(parser: Parser, work: Callable[[argparse.Namespace], None], argument
     Errors of this package are one line on stderr and the code 1; a wrong command line is argparse's and 2.
     """
     _behave_on_a_terminal()
+    show_compiling()
     parsed = parser.parse_args(arguments)
     try:
         work(parsed)
@@ -234,7 +236,9 @@ def print_limits(point: "TrimPoint") -> None:
     """What a trim needs beyond its limits, and where the model does not hold."""
     for text in point.beyond_limits:
         print(f"beyond its limits: {text}")
-    for text in point.warnings:
+    from sbs_sim.output.warnings_text import joined
+
+    for text in joined(point.warnings):
         print(f"{OUTSIDE}: {text}")
 
 

@@ -83,6 +83,7 @@ def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.analysis.linearize import linearize
     from sbs_sim.output.files import check_target, write
     from sbs_sim.output.json_text import to_json
+    from sbs_sim.output.warnings_text import joined
     from sbs_sim.pilot.hover_hold import HoverModel, design
     from sbs_sim.pilot.piloted_flight import MAX_DELAY
 
@@ -100,7 +101,7 @@ def _work(arguments: argparse.Namespace) -> None:
     results, warnings = {}, {}
     for name, (air, settling, duration) in airs.items():
         flight = _flown(craft, model, found, air, settling + duration, arguments.delay)
-        results[name], warnings[name] = _figures(craft, flight, settling), flight.warnings
+        results[name], warnings[name] = _figures(craft, flight, settling), joined(flight.warnings)
     _print(results)
     for name, lines in warnings.items():
         for line in lines:

@@ -152,6 +152,7 @@ def _print_sweep(found: "Sweep") -> None:
 
     from sbs_sim.output.units import RPM, label
     from sbs_sim.output.units import shown as shown_values
+    from sbs_sim.output.warnings_text import joined
 
     shown, unit = found.shown
     columns = {"pitch": "rad", "roll": "rad", **found.controls}
@@ -178,7 +179,7 @@ def _print_sweep(found: "Sweep") -> None:
         elif point.trim is not None and point.trim.beyond_limits:
             print(f"{found.parameter} {value:g}: beyond its limits: {'; '.join(point.trim.beyond_limits)}")
         if point.warnings:
-            print(f"{found.parameter} {value:g}: {OUTSIDE}: {'; '.join(point.warnings)}")
+            print(f"{found.parameter} {value:g}: {OUTSIDE}: {'; '.join(joined(point.warnings))}")
 
 
 def _error(found: "Sweep", shown: float, point: "SweepPoint") -> str:

@@ -8,8 +8,8 @@ given the other's `Address` as an argument.
 import contextlib
 import functools
 import gc
+import logging
 import os
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -96,15 +96,14 @@ class _Entry(Compiler):
     def __init__(self, typing: Any, target: Any, library: Any, *others: Any) -> None:
         library = _EntryLibrary(target.codegen(), "entry")
         library.enable_object_caching()
-        _tell_who_waits()
+        _say_that_it_takes_time()
         super().__init__(typing, target, library, *others)
 
 
 @functools.cache
-def _tell_who_waits() -> None:
-    """Say once, to a person at a terminal, why nothing happens for a while."""
-    if sys.stderr is not None and sys.stderr.isatty():
-        print("sbs_sim: compiling for this kind of aircraft, once: some seconds, up to a minute", file=sys.stderr)
+def _say_that_it_takes_time() -> None:
+    """Say once why nothing happens for a while; `sbs_sim.terminal.progress.show_compiling` shows it to a person."""
+    logging.getLogger(__name__).info("compiling for this kind of aircraft, once: some seconds, up to a minute")
 
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -19,6 +19,7 @@ from sbs_sim.errors import SbsError
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.confinement import keep_to_this_machine
 from sbs_sim.nodes.signals import ignore_interruptions, note_interruptions
+from sbs_sim.terminal.progress import show_compiling
 
 # What ROS raises where a name, a parameter or a setting of the environment makes a node impossible.
 ROS_ERRORS = (rclpy_implementation.RCLError, NameValidationException, ParameterException)
@@ -61,6 +62,7 @@ def run(
         0 after an interruption (Ctrl-C, SIGTERM, SIGHUP) or the end, 1 if the nodes could not start.
     """
     stop = end or threading.Event()
+    show_compiling()
     if code := _start_ros(args, first):
         return code
     nodes: list[Component] = []

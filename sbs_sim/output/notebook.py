@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sbs_sim.output.units import label, shown
+from sbs_sim.output.warnings_text import joined
 
 if TYPE_CHECKING:
     from sbs_sim.analysis.linear_model import LinearModel
@@ -68,7 +69,7 @@ def _sweep_row(value: float, point: "SweepPoint", numbers: int) -> list[str]:
     controls = zip(point.trim.controls.tolist(), point.trim.control_units, strict=True)
     angles = [*np.degrees([point.trim.pitch, point.trim.roll]), *(shown(angle, unit)[0] for angle, unit in controls)]
     growing = [mode.name for mode in point.model.modes if mode.is_growing] if point.model else []
-    remarks = [*([point.error] if point.error else []), *point.trim.beyond_limits, *point.warnings]
+    remarks = [*([point.error] if point.error else []), *point.trim.beyond_limits, *joined(point.warnings)]
     cells = [*(_fixed(angle, 3) for angle in angles), _fixed(point.trim.power.sum(), 1)]
     return [f"{value:.6g}", *cells, "; ".join(growing), "; ".join(remarks)]
 
@@ -85,7 +86,8 @@ def _condition(point: "TrimPoint") -> str:
 
 def _warnings(point: "TrimPoint") -> str:
     lines = [f"beyond its limits: {line}" for line in point.beyond_limits]
-    return "".join(map(_paragraph, [*lines, *(f"outside the model's validity: {line}" for line in point.warnings)]))
+    lines += [f"outside the model's validity: {line}" for line in joined(point.warnings)]
+    return "".join(map(_paragraph, lines))
 
 
 def _pole(pole: complex) -> str:

@@ -1,9 +1,23 @@
 """Bars that show on a terminal how far long work is, and nothing elsewhere."""
 
+import logging
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
+
+COMPILER = "sbs_sim.model.kernel"  # logger of what compiles
+
+
+def show_compiling() -> None:
+    """Show on a terminal when kernels are compiled, for which a person else waits without a word."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        return
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("sbs_sim: %(message)s"))
+    logger = logging.getLogger(COMPILER)
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
 
 
 @contextmanager

@@ -56,10 +56,11 @@ def test_values_are_scattered_normally_around_those_of_the_file(sbs):
 def test_the_command_says_in_how_many_flights_the_model_does_not_hold(tmp_path):
     files = ("--csv", tmp_path / "f.csv", "--json", tmp_path / "f.json")
     text = output("batch", "--flights", 2, "--duration", 0.2, "--climb-rate", -7, "--turbulence", 0, *files)
-    line = "MR1: vortex ring state, where momentum theory does not hold"
-    assert f"outside the model's validity in 2 flights: {line}\n" in text
-    assert all(row["warnings"].startswith(line) for row in csv.DictReader((tmp_path / "f.csv").open()))
-    assert all(flight["warnings"][0] == line for flight in json.loads((tmp_path / "f.json").read_text())["flights"])
+    line = "vortex ring state, where momentum theory does not hold"
+    assert f"outside the model's validity in 2 flights: MR1, MR2: {line}\n" in text
+    assert all(row["warnings"].startswith(f"MR1: {line}") for row in csv.DictReader((tmp_path / "f.csv").open()))
+    flights = json.loads((tmp_path / "f.json").read_text())["flights"]
+    assert all(flight["warnings"][0] == f"MR1: {line}" for flight in flights)
 
 
 def test_the_field_passes_with_the_airspeed_and_never_stops(sbs):

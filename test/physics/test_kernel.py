@@ -112,6 +112,9 @@ def test_everything_works_without_the_compiler_too():
 COMPILING = """
     import numpy as np
     from sbs_sim.model.kernel import entry
+    from sbs_sim.terminal.progress import show_compiling
+
+    show_compiling()
 
     @entry
     def double(x):

@@ -48,6 +48,7 @@ from sbs_sim.model.blade import (
     to_blade,
     with_axial_damper,
 )
+from sbs_sim.model.contact import contact_load, set_contact_rates
 from sbs_sim.model.duct import duct_flow, duct_thrust, sheltered
 from sbs_sim.model.frames import quaternion_rates, rotation, shaft_down
 from sbs_sim.model.fuselage import plate_drag
@@ -79,6 +80,8 @@ class Aircraft(NamedTuple):
     shapes: Any
     schedules: Any
     bends: Any
+    ground: Any
+    contacts: Any
 
 
 class Memory(NamedTuple):
@@ -180,6 +183,8 @@ def with_rotors(model, rotors, blades):
         shapes=model.shapes,
         schedules=as_records(model.schedules),
         bends=as_lanes(model.bends, air),
+        ground=as_records(model.ground),
+        contacts=as_records(model.contacts),
     )
 
 
@@ -259,6 +264,8 @@ def set_rates(aircraft, memory, flight, dx):
     set_body_rates(memory, flight, dx)
     if aircraft.switches[0].stand == 1:
         hold_locked_axes(aircraft, dx)
+    if aircraft.switches[0].contact == 1:
+        set_contact_rates(aircraft.ground[0], aircraft.contacts, memory.state, flight, dx)
     set_rotor_rates(aircraft, memory, dx)
 
 
@@ -523,7 +530,7 @@ def set_hub_velocities(aircraft, memory, flight):
 
 @kernel
 def body_loads(aircraft, memory, flight, swash):
-    """Loads on the rigid part: fuselage, surfaces, ducts and gyroscopic terms, first part of eq. (5.7)."""
+    """Loads on the rigid part: fuselage, surfaces, ducts, ground and gyroscopic terms, first part of eq. (5.7)."""
     air, body, omega = aircraft.air[0], aircraft.body[0], flight.omega
     drag = plate_drag(air.density, air.plate_areas, flight.air_velocity)
     force = drag - cross(omega, cross(omega, body.first_moment))
@@ -541,6 +548,9 @@ def body_loads(aircraft, memory, flight, swash):
         wash = wash_at(aircraft, memory, fuselage, ramps)
         load = fuselage_load(air.density, fuselage, aircraft.shapes, flight.air_velocity, omega, wash)
         force, moment = force + load.force, moment + load.moment
+    if aircraft.switches[0].contact == 1:
+        ground = contact_load(aircraft.ground[0], aircraft.contacts, memory.state, flight)
+        force, moment = force + ground.force, moment + ground.moment
     return ForceMoment(force, moment)
 
 

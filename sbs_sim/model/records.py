@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.model.state import BODY_SIZE, ROW, UNSEEN_NAMES
+from sbs_sim.model.state import BODY_SIZE, CONTACT_STATES, ROW, UNSEEN_NAMES
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -47,6 +47,28 @@ SWITCHES = {
     "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
     "teetering": INTEGER,  # 1 where a rotor is
     "wash": INTEGER,  # 1 where something adds to the inflow of a rotor, see `sbs_sim.model.dynamics.set_wash`
+    "contact": INTEGER,  # 1 for an aircraft that can stand on the ground
+}
+# the ground: a plane
+GROUND = {
+    "down": VECTOR,  # unit vector into it, NED
+    "first": VECTOR,  # unit vectors along it
+    "second": VECTOR,
+    "depth": LANES,  # of the plane below the origin, along `down`
+}
+# a point that touches it: see `sbs_sim.model.contact`
+CONTACT = {
+    "position": VECTOR,  # from the c.g.
+    "rolling": VECTOR,  # direction in which a wheel rolls
+    "stiffness": LANES,
+    "damping": LANES,
+    "inverse_onset": LANES,  # 1/m
+    "side_stiffness": LANES,
+    "side_damping": LANES,
+    "friction": LANES,
+    "rolling_friction": LANES,
+    "is_wheel": INTEGER,
+    "state": INTEGER,  # index of the first of its two deflections
 }
 ROTOR = {
     "rotor_speed": LANES,  # Omega; 0 where a drive turns the rotor, whose speed is a state
@@ -326,6 +348,9 @@ class Model(NamedTuple):
         What changes swashplate angles with the airspeed.
     bends : ndarray, shape (schedules, points, 2, n)
         Airspeeds [m/s], and the change of the slope of each there.
+    ground : structured ndarray, shape (1,)
+    contacts : structured ndarray, shape (points,)
+        Skids and wheels, where the aircraft stands on the ground.
     """
 
     switches: NDArray[Any]
@@ -345,6 +370,8 @@ class Model(NamedTuple):
     shapes: Array
     schedules: NDArray[Any]
     bends: Array
+    ground: NDArray[Any]
+    contacts: NDArray[Any]
 
 
 class Work(NamedTuple):
@@ -414,10 +441,11 @@ class Work(NamedTuple):
 
 
 def state_size(model: Model) -> int:
-    """Numbers in the state of one aircraft: of the body, of blades by flap, lag and their rates, inflow, and drives."""
+    """Numbers in the state of one aircraft: of the body, of flap, lag and their rates, inflow, drives, contact."""
     drives = sum(int((model.drives[name] >= 0).sum()) for name in ("speed_index", "torque_index", "governor_index"))
     unseen = len(UNSEEN_NAMES) * len(model.drives)
-    return BODY_SIZE + int(4 * model.rotors["blades"].sum() + 3 * len(model.rotors)) + drives + unseen
+    contacts = CONTACT_STATES * len(model.contacts)
+    return BODY_SIZE + int(4 * model.rotors["blades"].sum() + 3 * len(model.rotors)) + drives + unseen + contacts
 
 
 def make_work(model: Model) -> Work:

@@ -1025,6 +1025,7 @@ def _control(name: str, values: dict[str, Any]) -> Control:
 
 
 END_FLIGHT, CONTACT = "end_flight", "contact"
+GROUND_EFFECTS = ("none", "cheeseman_bennett", "measured")
 
 
 @dataclass(frozen=True)
@@ -1036,6 +1037,13 @@ class Ground:
         " carry it, and only its c.g. and rotors end the flight",
         (END_FLIGHT, CONTACT),
         default=END_FLIGHT,
+    )
+    effect: str = choice(
+        "Ground effect on the induced velocity of each rotor: none; cheeseman_bennett: a source and its image, at half"
+        " a radius above the ground and more; measured: Prouty's curve, from 0.127 to 1.2 diameters",
+        GROUND_EFFECTS,
+        symbol="k_g",
+        default=GROUND_EFFECTS[0],
     )
     altitude: float | None = number(
         "Height of the ground above the origin, where trims are and flights begin; without it there is none for trims,"

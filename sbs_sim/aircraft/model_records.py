@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft.commands import scheduled_controls
 from sbs_sim.aircraft.declaration import model_values
-from sbs_sim.aircraft.description import ENGINES, Body, Drive, Rotor
+from sbs_sim.aircraft.description import ENGINES, GROUND_EFFECTS, Body, Drive, Rotor
 from sbs_sim.aircraft.surfaces import Parts, parts_of, slope_changes
 from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import DEGREE, AirfoilTable, Grid, cell_grid, cells, common_grid
@@ -175,8 +175,10 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["scheduled"] = any(rotor.schedule for rotor in aircraft.rotors)
     switches["ducts"] = any(rotor.duct_exit is not None for rotor in aircraft.rotors)
     switches["contact"] = aircraft.has_contact
+    switches["ground_effect"] = GROUND_EFFECTS.index(aircraft.ground.effect)
     switches["teetering"] = any(rotor.is_teetering for rotor in aircraft.rotors)
     switches["wash"] = 0
+    switches["wash"] |= switches["ground_effect"] > 0
     return switches
 
 

@@ -52,6 +52,7 @@ from sbs_sim.model.contact import contact_load, set_contact_rates
 from sbs_sim.model.duct import duct_flow, duct_thrust, sheltered
 from sbs_sim.model.frames import quaternion_rates, rotation, shaft_down
 from sbs_sim.model.fuselage import plate_drag
+from sbs_sim.model.ground_effect import add_ground_wash
 from sbs_sim.model.inflow import INVERSE_MASS, Inflow, disc_flow, inflow_rates
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
@@ -243,6 +244,8 @@ def set_known_loads(aircraft, memory, flight, swash, psi):
     if aircraft.switches[0].wash == 1:
         set_hub_velocities(aircraft, memory, flight)
         set_wash(aircraft, memory)
+        if aircraft.switches[0].ground_effect > 0:
+            add_ground_wash(aircraft, memory, flight)
     set_blade_terms(aircraft, memory, flight, commands, psi)
     sum_blades(aircraft, memory)
     set_hub_velocities(aircraft, memory, flight)

@@ -47,6 +47,7 @@ SWITCHES = {
     "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
     "teetering": INTEGER,  # 1 where a rotor is
     "wash": INTEGER,  # 1 where something adds to the inflow of a rotor, see `sbs_sim.model.dynamics.set_wash`
+    "ground_effect": INTEGER,  # see `sbs_sim.model.ground_effect`
     "contact": INTEGER,  # 1 for an aircraft that can stand on the ground
 }
 # the ground: a plane

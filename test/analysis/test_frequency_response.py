@@ -36,9 +36,7 @@ def attitude_response(frequency, damping, delay):
 # -- responses -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("stick", "output"), [PITCH, ROLL, ("collective", "climb_rate"), ("collective", "thrust(1)")]
-)
+@pytest.mark.parametrize(("stick", "output"), [PITCH, ROLL, ("collective", "climb_rate"), ("collective", "thrust(1)")])
 def test_is_that_of_python_control(model, stick, output):
     found = model.frequency_response(stick, output)
     other = model.to_control()[model.output_names.index(output), model.control_names.index(stick)]

@@ -22,6 +22,7 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
+from plain_ground import contact, ground_washes
 from plain_parts import part_loads
 from scipy.interpolate import CubicHermiteSpline
 
@@ -145,6 +146,8 @@ def split_state(ac, x, lead_lag=True, cyclic_inflow=True):
             start += rotor.blades
     kept = np.array([1.0, 1.0, 1.0]) if cyclic_inflow else np.array([1.0, 0.0, 0.0])
     parts["inflow"] = [x[start + 3 * j : start + 3 * j + 3] * kept for j in range(len(ac.rotors))]
+    if stands_on_ground(ac):  # the deflections of its contact points stand behind
+        x = x[: len(x) - 2 * len(ac.contact_points)]
     if len(x) != start + 3 * len(ac.rotors):
         raise ValueError(f"state of length {len(x)}, expected {start + 3 * len(ac.rotors)}")
     return SimpleNamespace(position=x[0:3], quaternion=x[3:7], velocity=x[7:10], rate=x[10:13], **parts)
@@ -185,6 +188,11 @@ def mass_points(rotor, second_moment=None):
     integrals = [rotor.blade_mass, rotor.blade_mass * rotor.blade_cg, second_moment]
     masses = np.linalg.solve(np.vander(stations, increasing=True).T, integrals)
     return list(zip(stations, masses, strict=True))
+
+
+def stands_on_ground(ac):
+    """Return whether contact points carry it (section 7.7)."""
+    return getattr(ac, "has_contact", False)
 
 
 def stands(ac):
@@ -875,6 +883,12 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
     part_force, part_moment = part_loads(ac, air_velocity, state.rate, state.inflow)
     hub_velocities = [air_velocity + cross(state.rate, np.asarray(rotor.hub, dtype=float)) for rotor in ac.rotors]
     washes = all_washes(ac, state.inflow, hub_velocities)
+    if getattr(getattr(ac, "ground", None), "effect", "none") != "none":
+        taken = ground_washes(ac, state, attitude, hub_velocities)
+        washes = [wash._replace(blades=wash.blades + own) for wash, own in zip(washes, taken, strict=True)]
+    if stands_on_ground(ac):
+        ground = contact(ac, np.asarray(x), attitude)
+        part_force, part_moment = part_force + ground[0], part_moment + ground[1]
     air_loads = []
     for j, rotor in enumerate(ac.rotors):
         met, inflow = met_velocity(rotor, hub_velocities[j]), state.inflow[j] + washes[j].blades

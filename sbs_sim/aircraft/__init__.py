@@ -21,7 +21,7 @@ from sbs_sim.aircraft.airfoils import load_tables
 from sbs_sim.aircraft.commands import Row, drive_offset, padded, rows_of, scheduled_controls
 from sbs_sim.aircraft.consistency import consistency_problems, table_problems
 from sbs_sim.aircraft.declaration import cached_by_class, declarations, frozen, schema_of, values_of
-from sbs_sim.aircraft.description import Array, Description, Range, Rotor
+from sbs_sim.aircraft.description import CONTACT, Array, Description, Range, Rotor
 from sbs_sim.aircraft.model_records import drive_of, first_rotor, gear, model_of, with_fidelity
 from sbs_sim.aircraft.paths import (
     Location,
@@ -62,6 +62,8 @@ class Aircraft(Description):
     controls : tuple of Control
         Pilot controls: those of the paper's aircraft in its order, then others in that of the file.
     rotors : tuple of Rotor
+    ground : Ground
+    contact_points : tuple of ContactPoint
     drives : tuple of Drive
     sections : tuple of tuple of AirfoilTable
         Section data of each rotor's blades from the root outwards, see `Rotor.airfoil_at`; one object for sections
@@ -225,8 +227,15 @@ class Aircraft(Description):
     def layout(self) -> StateLayout:
         """Indices and names of the states of this aircraft."""
         return StateLayout(
-            tuple(rotor.blades for rotor in self.rotors), tuple(drive.state_names for drive in self.drives)
+            tuple(rotor.blades for rotor in self.rotors),
+            tuple(drive.state_names for drive in self.drives),
+            len(self.contact_points) if self.has_contact else 0,
         )
+
+    @property
+    def has_contact(self) -> bool:
+        """Its contact points carry it on the ground."""
+        return self.ground.contact == CONTACT
 
     @cached_property
     def locked_names(self) -> frozenset[str]:
@@ -252,7 +261,8 @@ class Aircraft(Description):
         to the declarations later do not change the hash of older files.
         """
         digest = hashlib.sha256()
-        for part in (self.environment, self.body, self.options, *self.rotors, *self.drives):
+        points = self.contact_points if self.has_contact else ()
+        for part in (self.environment, self.body, self.options, self.ground, *points, *self.rotors, *self.drives):
             self._digest_part(digest, part)
         if self.control_names != CONTROL_NAMES or any(c.held is not None or not c.is_angle for c in self.controls):
             for control in self.controls:

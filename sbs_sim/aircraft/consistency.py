@@ -8,7 +8,7 @@ import numpy as np
 
 from sbs_sim import checks
 from sbs_sim.aircraft.blade_mass import MIN_BLADE_MASS
-from sbs_sim.aircraft.description import STAND_AXES, TRIMMED_CONTROLS, Array, MixingSchedule, Range, Rotor
+from sbs_sim.aircraft.description import CONTACT, STAND_AXES, TRIMMED_CONTROLS, Array, MixingSchedule, Range, Rotor
 from sbs_sim.aircraft.part_consistency import part_problems
 from sbs_sim.model.airfoil import FINEST_DEG, MAX_HALF, NUMBER_NAMES, common_half
 from sbs_sim.model.state import CONTROL_NAMES, EULER_NAMES, SWASHPLATE_NAMES
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 RESERVED_NAMES = frozenset(
     {*EULER_NAMES, *SWASHPLATE_NAMES, "time", "thrust", "torque", "power", "state", "controls", "swashplate", "pitch"}
     | {"roll", "heading", "airspeed", "climb_rate", "turn_rate", "residual", "acceleration", "warnings"}
+    | {"contact_force", "contact_depth"}
 ) - {*CONTROL_NAMES}
 MIN_LENGTH = 1e-6  # m, of a damper
 LINE, TABLE = ("root", "tip"), ("stations", "values")  # the two ways to give values along the blade
@@ -122,6 +123,7 @@ def consistency_problems(aircraft: "Aircraft") -> list[str]:
                 problems.append(f"options.{key} = {value!r}: allowed with options.coupling = paper only")
     problems += _control_problems(aircraft)
     problems += part_problems(aircraft)
+    problems += _contact_problems(aircraft)
     for i, rotor in enumerate(aircraft.rotors):
         problems += [f"rotors[{i}].{problem}" for problem in _rotor_problems(rotor)]
         problems += _section_problems(aircraft, i)
@@ -192,6 +194,25 @@ def _drive_problems(aircraft: "Aircraft", names: list[str]) -> list[str]:
             )
         if drive.proportional_gain > 0 and drive.integral_gain == 0:
             problems.append(f"drives[{i}].governor.integral_gain = 0: allowed with a proportional_gain is > 0")
+    return problems
+
+
+def _contact_problems(aircraft: "Aircraft") -> list[str]:
+    """Of the points that touch the ground."""
+    points, problems = aircraft.contact_points, []
+    names = [point.name for point in points]
+    problems += [
+        f"contact_points: name = {name}: used twice" for name in sorted({n for n in names if names.count(n) > 1})
+    ]
+    for i, point in enumerate(points):
+        if point.rolling is not None and np.linalg.norm(point.rolling) < MIN_LENGTH:
+            problems.append(
+                f"contact_points[{i}].rolling = {point.rolling.tolist()}: allowed is a vector that is not zero"
+            )
+    if aircraft.has_contact and not points:
+        problems.append(f"ground.contact = {CONTACT!r}: allowed with contact_points only")
+    if aircraft.has_contact and aircraft.body.is_stand:
+        problems.append(f"ground.contact = {CONTACT!r}: not allowed on a stand")
     return problems
 
 

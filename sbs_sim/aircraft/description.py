@@ -49,7 +49,7 @@ from sbs_sim.model.state import (
 Array = NDArray[np.float64]
 Range = tuple[float, float]
 
-MAX_ROTORS, MAX_CONTROLS, MAX_SURFACES = 16, 16, 32
+MAX_ROTORS, MAX_CONTROLS, MAX_SURFACES, MAX_CONTACTS = 16, 16, 32, 32
 MAX_CONTROL = 1e6  # of a control that is no angle, in its unit
 TRIMMED_CONTROLS = 4  # that a trim finds
 MAX_BLADES = 20
@@ -1024,6 +1024,119 @@ def _control(name: str, values: dict[str, Any]) -> Control:
     )
 
 
+END_FLIGHT, CONTACT = "end_flight", "contact"
+GROUND_EFFECTS = ("none", "cheeseman_bennett", "measured")
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground: a plane below the origin."""
+
+    contact: str = choice(
+        "end_flight: an aircraft whose c.g. or rotor touches the ground flies no further; contact: its contact points"
+        " carry it, and only its c.g. and rotors end the flight",
+        (END_FLIGHT, CONTACT),
+        default=END_FLIGHT,
+    )
+    effect: str = choice(
+        "Ground effect on the induced velocity of each rotor: none; cheeseman_bennett: a source and its image, at half"
+        " a radius above the ground and more; measured: Prouty's curve, from 0.127 to 1.2 diameters",
+        GROUND_EFFECTS,
+        symbol="k_g",
+        default=GROUND_EFFECTS[0],
+    )
+    altitude: float | None = number(
+        "Height of the ground above the origin, where trims are and flights begin; without it there is none for trims,"
+        " and for flights the one that is asked for",
+        -1e5,
+        1e5,
+        "m",
+        symbol="h_g",
+        default=None,
+    )
+    slope: float = number("Angle of the ground to the horizontal", 0, 60, "deg", symbol=r"\sigma", default=0.0)
+    slope_heading: float = number(
+        "Heading in which the ground rises, from north to east", -360, 360, "deg", symbol=r"\psi_\sigma", default=0.0
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPoint(ByContent):
+    """A point of a skid or a wheel that touches the ground.
+
+    `position` and `rolling` have the shape (3,).
+    """
+
+    name: str = string("Name of the point", is_physics=False)
+    position: Array = array(
+        "Lowest point of the unloaded skid or wheel from the c.g., body axes",
+        -100,
+        100,
+        "m",
+        shape=(3,),
+        symbol=r"\mathbf r_c",
+        model_field="position",
+    )
+    stiffness: float = number(
+        "Stiffness across the ground", 0, 1e9, "N/m", symbol="k_c", above_minimum=True, model_field="stiffness"
+    )
+    damping: float = number(
+        "Damping across the ground, from `onset` on", 0, 1e8, "N s/m", symbol="c_c", model_field="damping"
+    )
+    onset: float = number(
+        "Depth at which that damping is complete; it grows from zero at the surface",
+        1e-6,
+        10,
+        "m",
+        symbol=r"\delta_0",
+        default=0.005,
+    )
+    side_stiffness: float | None = number(
+        "Stiffness along the ground, as long as the point does not slide; that across it if left out",
+        0,
+        1e9,
+        "N/m",
+        symbol="k_s",
+        above_minimum=True,
+        default=None,
+    )
+    side_damping: float | None = number(
+        "Damping along the ground, as long as the point does not slide; that across it if left out",
+        0,
+        1e8,
+        "N s/m",
+        symbol="c_s",
+        default=None,
+    )
+    friction: float = number("Coefficient of friction", 0, 10, "1", symbol=r"\mu", model_field="friction")
+    rolling: Array | None = array(
+        "Direction in which a wheel rolls, body axes, any length; without it the point is a skid's",
+        -1e3,
+        1e3,
+        "1",
+        shape=(3,),
+        symbol=r"\mathbf e_r",
+        default=None,
+    )
+    rolling_friction: float = number(
+        "Coefficient of friction of a wheel in that direction; that of its brakes while they are on",
+        0,
+        10,
+        "1",
+        symbol=r"\mu_r",
+        model_field="rolling_friction",
+        default=0.02,
+    )
+
+    @property
+    def sideways(self) -> tuple[float, float]:
+        """Stiffness [N/m] and damping [N s/m] along the ground."""
+        return (
+            self.stiffness if self.side_stiffness is None else self.side_stiffness,
+            self.damping if self.side_damping is None else self.side_damping,
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Description(ByContent):
     """All values of an aircraft file."""
@@ -1036,6 +1149,14 @@ class Description(ByContent):
     controls: tuple[Control, ...] = _controls()
     rotors: tuple[Rotor, ...] = parts(
         f"The rotors, 1 to {MAX_ROTORS} of them", Rotor, 1, MAX_ROTORS, rules=MASS_RULES, complete=with_blade_mass
+    )
+    ground: Ground = part("The ground", Ground, default={})
+    contact_points: tuple[ContactPoint, ...] = parts(
+        f"Points of skids and wheels that touch the ground, up to {MAX_CONTACTS} of them, see ground.contact",
+        ContactPoint,
+        0,
+        MAX_CONTACTS,
+        default=[],
     )
     drives: tuple[Drive, ...] = parts(
         "Drives, which make the speeds of their rotors states of the model; without one a rotor keeps its speed",

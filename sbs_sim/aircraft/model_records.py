@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from sbs_sim.aircraft.commands import scheduled_controls
 from sbs_sim.aircraft.declaration import model_values
-from sbs_sim.aircraft.description import ENGINES, Body, Drive, Rotor
+from sbs_sim.aircraft.description import ENGINES, GROUND_EFFECTS, Body, Drive, Rotor
 from sbs_sim.aircraft.surfaces import Parts, parts_of, slope_changes
 from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import DEGREE, AirfoilTable, Grid, cell_grid, cells, common_grid
 from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import hub_axes
+from sbs_sim.model.solve import length
 from sbs_sim.model.state import ENGINE_TORQUE, GOVERNOR, ROW, SPEED, SWASHPLATE_NAMES, UNSEEN_NAMES, harmonic_count
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 SECONDS_PER_HOUR = 3600.0
+NO_GROUND = 1e9  # m, depth of the ground where there is none
 MIN_DENSITY = 1e-12  # kg/m^3, less than at 300 km: below it is vacuum
 
 
@@ -55,6 +57,8 @@ def model_of(aircraft: "Aircraft") -> R.Model:
         stall=_stall(aircraft),
         **_parts(aircraft)._asdict(),
         **_schedules(aircraft),
+        ground=ground_record(aircraft, aircraft.ground.altitude),
+        contacts=_contacts(aircraft),
     )
 
 
@@ -98,6 +102,40 @@ def _schedules(aircraft: "Aircraft") -> dict[str, NDArray[Any]]:
     return {"schedules": schedules, "bends": bends}
 
 
+def ground_record(aircraft: "Aircraft", altitude: float | None) -> NDArray[Any]:
+    """Record of the ground at a height above the origin [m], or far below where there is none."""
+    ground, record = aircraft.ground, R.records(R.GROUND, 1, 1)
+    slope, heading = cosine_and_sine(ground.slope), cosine_and_sine(ground.slope_heading)
+    down = np.array([-0.0 + slope[1] * heading[0], slope[1] * heading[1], slope[0]])
+    up_slope = np.array([slope[0] * heading[0], slope[0] * heading[1], -slope[1]])
+    values = {
+        "down": down,
+        "first": up_slope,
+        "second": np.array([-heading[1], heading[0], 0.0]),
+        "depth": NO_GROUND if altitude is None or altitude == -math.inf else -altitude * slope[0],
+    }
+    _set(record[0], values)
+    return record
+
+
+def _contacts(aircraft: "Aircraft") -> NDArray[Any]:
+    points = aircraft.contact_points if aircraft.has_contact else ()
+    contacts = R.records(R.CONTACT, len(points), 1)
+    for i, point in enumerate(points):
+        stiffness, damping = point.sideways
+        rolling = np.array([1.0, 0.0, 0.0]) if point.rolling is None else point.rolling / length(point.rolling)
+        values = {
+            **model_values(point, R.CONTACT),
+            "rolling": rolling,
+            "inverse_onset": 1.0 / point.onset,
+            "side_stiffness": stiffness,
+            "side_damping": damping,
+        }
+        _set(contacts[i], values)
+        contacts[i]["is_wheel"], contacts[i]["state"] = point.rolling is not None, aircraft.layout.contact(i).start
+    return contacts
+
+
 def _stall(aircraft: "Aircraft") -> Array:
     angles = aircraft.stall_table
     stall = R.aligned((aircraft.layout.blade_count, *angles.shape[1:], 1), float)
@@ -136,7 +174,11 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["stand"] = aircraft.body.is_stand
     switches["scheduled"] = any(rotor.schedule for rotor in aircraft.rotors)
     switches["ducts"] = any(rotor.duct_exit is not None for rotor in aircraft.rotors)
+    switches["contact"] = aircraft.has_contact
+    switches["ground_effect"] = GROUND_EFFECTS.index(aircraft.ground.effect)
     switches["teetering"] = any(rotor.is_teetering for rotor in aircraft.rotors)
+    switches["wash"] = 0
+    switches["wash"] |= switches["ground_effect"] > 0
     return switches
 
 

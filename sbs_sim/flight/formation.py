@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.content import ByContent
 from sbs_sim.errors import SimulationError
+from sbs_sim.flight.contact import ground_forces
 from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.records import Rows
 from sbs_sim.flight.rotor_matrices import arranged
@@ -208,6 +209,7 @@ def _rows(one: Simulation, plan: _Plan, angles: Array, states: Array, forces: Ar
         azimuth=one.aircraft.turned(plan.azimuth, states),
         loads=np.ascontiguousarray(loads).reshape(len(plan.steps), -1, LOAD_SIZE),
         wind=plan.wind,
+        contact=ground_forces(one.model, states),
     )
 
 

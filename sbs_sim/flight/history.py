@@ -12,6 +12,7 @@ from sbs_sim.flight.records import Rows, Snapshot
 from sbs_sim.flight.validity import flight_warnings
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
+from sbs_sim.model.contact import DEPTH
 from sbs_sim.model.frames import euler_angles, to_body
 
 Array = NDArray[np.float64]
@@ -67,6 +68,9 @@ def named_histories(aircraft: Aircraft, blocks: Sequence[tuple[Rows, Array]], lo
     wind = np.concatenate([rows.wind for rows, _ in blocks])
     attitude, velocity = states[:, S.ATTITUDE : S.VELOCITY], states[:, S.VELOCITY : S.RATES]
     speeds = aircraft.rotor_speeds(states)
+    if aircraft.has_contact:
+        contact = np.concatenate([rows.contact for rows, _ in blocks if rows.contact is not None])
+        flown |= {"contact_force": contact[..., :DEPTH], "contact_depth": contact[..., DEPTH]}
     return flown | {
         "acceleration": np.concatenate([rows.acceleration for rows, _ in blocks]),
         "thrust": loads[:, :, R.THRUST],

@@ -41,6 +41,8 @@ class Instants(ByContent, Generic[Step, Time]):
         Velocity of the air, NED [m/s].
     working : ndarray, shape (n_rotors, WORKING_SIZE) or (n, n_rotors, WORKING_SIZE), or None
         Working states of the rotors, see `sbs_sim.model.working_state`; None where they are not known.
+    contact : ndarray, shape (n_points, CONTACT_SIZE) or (n, n_points, CONTACT_SIZE), or None
+        Of each contact point the force of the ground, body axes [N], and the depth below it [m].
     """
 
     step: Step
@@ -52,6 +54,7 @@ class Instants(ByContent, Generic[Step, Time]):
     loads: Array
     wind: Array
     working: Array | None = None
+    contact: Array | None = None
 
 
 class Snapshot(Instants[int, float]):

@@ -101,7 +101,8 @@ def _rates_by_states(aircraft: "Aircraft", lead_lag: bool, cyclic_inflow: bool) 
     found = engine.jacobian(point, swashplates, steps, layout.linear_owners, np.zeros((1, rotors)))
     linear = np.zeros((layout.size, layout.size))
     first = S.LINEAR_BODY_SIZE
-    linear[S.BODY_SIZE :, S.BODY_SIZE :] = found[0, first:size, first:size].T
+    seen = slice(S.BODY_SIZE, S.BODY_SIZE + size - first)
+    linear[seen, seen] = found[0, first:size, first:size].T
     return linear
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations  # `help` then shows types by their names
 
-import math
 from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
@@ -29,7 +28,7 @@ def simulate(
     cyclic_inflow: bool = True,
     method: str = AUTO,
     wind: Wind | None = None,
-    ground_altitude: float = -math.inf,
+    ground_altitude: float | None = None,
     actuators: bool = False,
     events: Sequence[EngineFailure] = (),
 ) -> History:
@@ -63,7 +62,8 @@ def simulate(
         "controls" (n, n_controls), "swashplate" (n, n_rows, 3) [rad], see `Aircraft.mix`, "acceleration" (n, 3)
         [m/s^2], "thrust" [N], "torque" [N m], "power" [W] (n, n_rotors), "state" (n, size) and every name of the
         simulation state (n,), "phi", "theta", "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed
-        relative to the air [m/s].
+        relative to the air [m/s]. Of an aircraft that stands on the ground "contact_force" (n, n_points, 3), of the
+        ground on its contact points, body axes [N], and "contact_depth" (n, n_points), below the surface [m].
         `warnings` says where the model does not hold.
 
     Raises

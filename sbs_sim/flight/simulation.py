@@ -17,7 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.commands import row_problems
+from sbs_sim.aircraft.model_records import ground_record
 from sbs_sim.errors import SimulationError
+from sbs_sim.flight.contact import check_step, ground_forces
 from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.formation import Flown, Formation
 from sbs_sim.flight.records import Event, Snapshot
@@ -81,8 +83,9 @@ class Simulation:
         whose error is of first order in the step. Aircraft with drives fly by "rk4" or "tsit5". "auto" is "tsit5" for
         these, and "etd" for others; `options` has which.
     wind : Wind
-    ground_altitude : float
-        Height of level ground above the origin [m]; touching it ends the flight. -inf is no ground.
+    ground_altitude : float, optional
+        Height of the ground above the origin [m], and none for -inf; that of the aircraft file if not given. A c.g. or
+        rotor that touches it ends the flight; contact points carry an aircraft whose file has `ground.contact`.
 
     Raises
     ------
@@ -102,7 +105,7 @@ class Simulation:
         cyclic_inflow: bool = True,
         method: str = AUTO,
         wind: Wind | None = None,
-        ground_altitude: float = -math.inf,
+        ground_altitude: float | None = None,
     ) -> None:
         checks.instance("aircraft", aircraft, Aircraft, SimulationError)
         tick = checks.number("tick", tick, *TICKS, "s", SimulationError)
@@ -110,6 +113,8 @@ class Simulation:
         lead_lag = checks.flag("lead_lag", lead_lag, SimulationError)
         cyclic_inflow = checks.flag("cyclic_inflow", cyclic_inflow, SimulationError)
         method = chosen_method(aircraft, method)
+        if ground_altitude is None:
+            ground_altitude = -math.inf if aircraft.ground.altitude is None else aircraft.ground.altitude
         ground = checks.number("ground_altitude", ground_altitude, -math.inf, PLAUSIBLE_POSITION, "m", SimulationError)
         self.options: dict[str, Any] = {
             "tick": tick,
@@ -132,8 +137,12 @@ class Simulation:
             )
         self.step_size = tick / self.steps_per_tick
         self.method = METHODS[method]
-        self.model = aircraft.model(lead_lag, cyclic_inflow)
-        self.bounds = np.append(plausible_bounds(aircraft), -ground)
+        self.ground = ground_record(aircraft, ground)
+        self.model = aircraft.model(lead_lag, cyclic_inflow)._replace(ground=self.ground)
+        if aircraft.has_contact:
+            check_step(aircraft, self.method, self.step_size)
+        depth = float(self.ground["depth"][0, 0])
+        self.bounds = np.append(plausible_bounds(aircraft), math.inf if math.isinf(ground) else depth)
         self.watch = max(1, round(WATCH_PERIOD / tick))
         self.azimuth0 = np.zeros(len(aircraft.rotors))
         self._held = held_states(aircraft, lead_lag, cyclic_inflow)
@@ -146,7 +155,8 @@ class Simulation:
     def engine(self) -> Engine:
         """What flies this aircraft alone."""
         options = self.options["lead_lag"], self.options["cyclic_inflow"]
-        return Engine(self.aircraft.arranged(*options, "blades"), self.method, arranged([self.rotor_matrices]))
+        model = self.aircraft.arranged(*options, "blades")._replace(ground=self.ground)
+        return Engine(model, self.method, arranged([self.rotor_matrices]))
 
     @property
     def rotor_matrices(self) -> RotorMatrices | None:
@@ -225,7 +235,7 @@ class Simulation:
             values[S.ATTITUDE : S.ATTITUDE + 4] = quaternion / norm
         values[self._held] = 0.0
         down = np.zeros((1, 1))
-        lowest_point(self.model.rotors, values[:, np.newaxis], down)
+        lowest_point(self.ground, self.model.rotors, values[:, np.newaxis], down)
         lowest, ground = -float(down[0, 0]), -self.bounds[-1]
         if lowest <= ground:
             raise SimulationError(
@@ -330,7 +340,7 @@ class Simulation:
             speed = math.sqrt(sum(float(part) ** 2 for part in self.state[S.VELOCITY : S.RATES]))
             return SimulationError(
                 f"ground contact after step {self.step} (t = {self.time:.4f} s) at {speed:.3g} m/s:"
-                f" the ground is at {-self.bounds[-1]:g} m"
+                f" the ground is at {self.options['ground_altitude']:g} m"
             )
         return SimulationError(
             f"step {self.step + 1} (t = {(self.step + 1) * self.step_size:.4f} s) would take"
@@ -377,6 +387,7 @@ class Simulation:
             *(engine.work, engine.tick.slopes[0], True),
         )
         working_state(engine.model, engine.work, working)
+        contact = ground_forces(self.model, self.state[np.newaxis])
         down = down_of(self.state[np.newaxis, S.ATTITUDE : S.VELOCITY])[0]
         return Snapshot(
             step=self.step,
@@ -388,6 +399,7 @@ class Simulation:
             loads=engine.work.load_rows.reshape(engine.rotors, -1).copy(),
             wind=air,
             working=working[..., 0],
+            contact=None if contact is None else contact[0],
         )
 
 

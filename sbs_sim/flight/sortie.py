@@ -23,7 +23,7 @@ from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight.validity import flight_warnings
-from sbs_sim.model.records import FUSELAGE, INTEGER, SCHEDULE, SURFACE, Model
+from sbs_sim.model.records import CONTACT, FUSELAGE, INTEGER, SCHEDULE, SURFACE, Model
 from sbs_sim.model.wind import Wind
 
 Array = NDArray[np.float64]
@@ -187,7 +187,8 @@ def structure(simulation: Simulation) -> Any:
 
 def _integers(model: Model) -> Iterator[bytes]:
     """What lanes have in common of surfaces, fuselages and schedules, and how many of them there are."""
-    parts = (SURFACE, model.surfaces), (FUSELAGE, model.fuselages), (SCHEDULE, model.schedules)
+    parts: tuple[Any, ...] = (SURFACE, model.surfaces), (FUSELAGE, model.fuselages)
+    parts += (SCHEDULE, model.schedules), (CONTACT, model.contacts)
     for kind, records in parts:
         yield from (records[name].tobytes() for name, shape in kind.items() if shape is INTEGER)
 

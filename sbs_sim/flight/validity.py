@@ -11,6 +11,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.description import Rotor
 from sbs_sim.model import working_state as W
 from sbs_sim.model.airfoil import NUMBER_NAMES
+from sbs_sim.model.ground_effect import CURVE, LEAST_HEIGHT
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,8 @@ MAX_OUTSIDE = 0.1  # of the disc, with Reynolds or Mach numbers that the airfoil
 RING_DESCENT = (0.45, 1.5)
 RING_EDGEWISE = 0.95
 WINDMILL_DESCENT = 2.0
+# Heights of a hub above the ground, over the radius, below which the ground effect of a choice is not known.
+LEAST_HEIGHTS = {"cheeseman_bennett": LEAST_HEIGHT, "measured": 2.0 * float(CURVE[0, 0])}
 MARGIN = 1e-9  # for rounding
 MIN_INFLOW = 0.002  # hover inflow ratio below which a rotor carries nothing, and has none of these states
 
@@ -150,6 +153,8 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
             found.append(f"{rotor.name}: advance ratio above {MAX_ADVANCE_RATIO:g}")
         if state.stalled_share > MAX_STALLED:
             found.append(f"{rotor.name}: stall on more than {MAX_STALLED:.0%} of the disc, without its dynamics")
+        if (least := LEAST_HEIGHTS.get(aircraft.ground.effect)) and float(row[W.HEIGHT]) < least:
+            found.append(f"{rotor.name}: below {least:g} radii above the ground, where the ground effect is not known")
         if state.reversed_share > MAX_REVERSED:
             found.append(f"{rotor.name}: reverse flow on more than {MAX_REVERSED:.0%} of the disc")
         if aircraft.number_axis(j) != "mach" and tip_mach(aircraft, rotor, row) > MAX_TIP_MACH:
@@ -193,6 +198,7 @@ def _is_quiet(aircraft: Aircraft, working: Array) -> NDArray[np.bool_]:
         & (working[..., W.STALLED] <= MAX_STALLED)
         & (working[..., W.REVERSED] <= MAX_REVERSED)
         & (working[..., W.OUTSIDE] <= MAX_OUTSIDE)
+        & (working[..., W.HEIGHT] >= LEAST_HEIGHTS.get(aircraft.ground.effect, -math.inf))
         & (tips * (1.0 + working[..., W.ADVANCE_RATIO]) / sound <= limits)
         # no vortex ring before its slowest descent, and nothing beyond it
         & (working[..., W.DESCENT] < RING_DESCENT[0] * (1.0 - MARGIN) * working[..., W.HOVER_INFLOW])

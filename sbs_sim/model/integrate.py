@@ -5,12 +5,13 @@ import math
 import numpy as np
 
 from sbs_sim.lanes import all_lanes, any_lane, as_lanes, as_records, floor, maximum, minimum, sqrt
+from sbs_sim.model.contact import give_way
 from sbs_sim.model.exponential import begin_exponential_step, exponential_stage
 from sbs_sim.model.frames import Quaternion
-from sbs_sim.model.ground import lowest_down_coordinate
+from sbs_sim.model.ground import lowest_coordinate
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_rotation_terms
-from sbs_sim.model.state import BODY_SIZE, attitude_at, set_attitude
+from sbs_sim.model.state import BODY_SIZE, CONTACT_STATES, attitude_at, set_attitude
 from sbs_sim.model.wind import wind_at
 
 RK4, PARTITIONED, TSIT5, ETD = range(4)
@@ -68,7 +69,8 @@ def advance(derivative, model, x, swash, psi0, first_step, steps, h, wind, metho
     method : int
         RK4, PARTITIONED, TSIT5 or ETD.
     bounds : ndarray, shape (size + 1, n)
-        Largest magnitude of each state that is still plausible, and the down coordinate of the ground [m].
+        Largest magnitude of each state that is still plausible, and the distance of the ground from the
+        origin, along `ground.down` [m].
     work : Work
     tick : Tick
         Memory.
@@ -99,23 +101,29 @@ def make_step(derivative, model, x, swash, psi0, number, h, wind, fraction, shar
     state, stage, air = as_lanes(x, rotors), as_lanes(tick.stage, rotors), as_lanes(wind, rotors)
     slopes, psi, blowing = as_lanes(tick.slopes, rotors), as_lanes(tick.psi, rotors), as_lanes(tick.wind, rotors)
     start, tableau, count, time = as_lanes(psi0, rotors), TABLEAUS[method], STAGES[method], number * h
+    contacts, size = model.contacts.shape[0], state.shape[0]
+    behind = size - CONTACT_STATES * contacts  # the deflections of what touches the ground
     if method == ETD:
         begin_exponential_step(rotors, tick.exponential, state)
     for k in range(count):
         ahead = node(tableau[k], k)
         if k == 0 or method != ETD:
-            combine(state, slopes, tableau[k], k, h, state.shape[0], stage)
+            combine(state, slopes, tableau[k], k, h, 0, size, stage)
         set_azimuths(rotors, start, (number + ahead) * h, psi)
         wind_at(air, time + ahead * h, fraction + ahead * share, blowing)
         derivative(model, tick.stage, swash, tick.psi, tick.wind, work, tick.slopes[k], False)
         if method == PARTITIONED and k > 0:
             freeze_forcing(as_records(model.switches)[0], rotors, state, stage, slopes[0], slopes[k])
         if method == ETD:
-            combine(state, slopes, tableau[k + 1 if k + 1 < count else -1], k + 1, h, BODY_SIZE, stage)
+            factors = tableau[k + 1 if k + 1 < count else -1]
+            combine(state, slopes, factors, k + 1, h, 0, BODY_SIZE, stage)
+            combine(state, slopes, factors, k + 1, h, behind, size, stage)
             exponential_stage(rotors, as_records(model.blades), tick.exponential, slopes[k], k, stage)
     if method != ETD:
-        combine(state, slopes, tableau[-1], count, h, state.shape[0], stage)
+        combine(state, slopes, tableau[-1], count, h, 0, size, stage)
     normalize_attitude(stage)
+    if contacts > 0:
+        give_way(as_records(model.ground)[0], as_records(model.contacts), stage)
 
 
 @kernel
@@ -136,15 +144,15 @@ def node(factors, count):
 
 
 @kernel
-def combine(state, slopes, factors, count, h, size, stage):
-    """Set the first `size` states of a stage to the state plus h times the sum of factors times slopes."""
-    for i in range(size):
+def combine(state, slopes, factors, count, h, first, end, stage):
+    """Set the states of a stage from `first` to `end` to the state plus h times the sum of factors times slopes."""
+    for i in range(first, end):
         stage[i] = state[i]
     for m in range(count):
         factor = factors[m]
         if factor != 0.0:
             step, slope = h * factor, slopes[m]
-            for i in range(size):
+            for i in range(first, end):
                 stage[i] = stage[i] + step * slope[i]
 
 
@@ -217,7 +225,7 @@ def all_plausible(model, x, bounds, failed_state):
         plausible = plausible & (abs(state[i]) <= bound[i])
     ground = bound[x.shape[0]]
     if any_lane(ground < math.inf):
-        plausible = plausible & (lowest_down_coordinate(rotors, state) < ground)
+        plausible = plausible & (lowest_coordinate(as_records(model.ground)[0], rotors, state) < ground)
     return all_lanes(plausible)
 
 
@@ -226,7 +234,8 @@ def accept_plausible(model, x, tick, bounds, step, steps_done, failed_state):
     """Accept the new states that are plausible, and name the failed state of the others; False if no flight goes on."""
     size, any_flying = x.shape[0], False
     rotors = as_records(model.rotors)
-    as_lanes(tick.lowest_point, rotors)[0] = lowest_down_coordinate(rotors, as_lanes(tick.stage, rotors))
+    ground = as_records(model.ground)[0]
+    as_lanes(tick.lowest_point, rotors)[0] = lowest_coordinate(ground, rotors, as_lanes(tick.stage, rotors))
     for lane in range(failed_state.size):
         if failed_state[lane] != FLYING:
             continue

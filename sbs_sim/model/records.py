@@ -12,12 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.model.state import BODY_SIZE, ROW, UNSEEN_NAMES
+from sbs_sim.model.state import BODY_SIZE, CONTACT_STATES, ROW, UNSEEN_NAMES
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 LANES, VECTOR, MATRIX, INTEGER = (), (3,), (3, 3), None
 LINE = 64  # bytes of a cache line
+OTHERS, WASH_ROWS = 3, 4  # of `Work.wash`: row of the flow through the disc, and all rows
 QUAD = 4  # blades that are summed first, see `sbs_sim.lanes.memory`
 
 AIR = {"density": LANES, "gravity": LANES, "plate_areas": VECTOR}
@@ -45,6 +46,30 @@ SWITCHES = {
     "scheduled": INTEGER,  # 1 where shares in swashplate angles change with the airspeed
     "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
     "teetering": INTEGER,  # 1 where a rotor is
+    "wash": INTEGER,  # 1 where something adds to the inflow of a rotor, see `sbs_sim.model.dynamics.set_wash`
+    "ground_effect": INTEGER,  # see `sbs_sim.model.ground_effect`
+    "contact": INTEGER,  # 1 for an aircraft that can stand on the ground
+}
+# the ground: a plane
+GROUND = {
+    "down": VECTOR,  # unit vector into it, NED
+    "first": VECTOR,  # unit vectors along it
+    "second": VECTOR,
+    "depth": LANES,  # of the plane below the origin, along `down`
+}
+# a point that touches it: see `sbs_sim.model.contact`
+CONTACT = {
+    "position": VECTOR,  # from the c.g.
+    "rolling": VECTOR,  # direction in which a wheel rolls
+    "stiffness": LANES,
+    "damping": LANES,
+    "inverse_onset": LANES,  # 1/m
+    "side_stiffness": LANES,
+    "side_damping": LANES,
+    "friction": LANES,
+    "rolling_friction": LANES,
+    "is_wheel": INTEGER,
+    "state": INTEGER,  # index of the first of its two deflections
 }
 ROTOR = {
     "rotor_speed": LANES,  # Omega; 0 where a drive turns the rotor, whose speed is a state
@@ -324,6 +349,9 @@ class Model(NamedTuple):
         What changes swashplate angles with the airspeed.
     bends : ndarray, shape (schedules, points, 2, n)
         Airspeeds [m/s], and the change of the slope of each there.
+    ground : structured ndarray, shape (1,)
+    contacts : structured ndarray, shape (points,)
+        Skids and wheels, where the aircraft stands on the ground.
     """
 
     switches: NDArray[Any]
@@ -343,6 +371,8 @@ class Model(NamedTuple):
     shapes: Array
     schedules: NDArray[Any]
     bends: Array
+    ground: NDArray[Any]
+    contacts: NDArray[Any]
 
 
 class Work(NamedTuple):
@@ -379,6 +409,10 @@ class Work(NamedTuple):
     coning : structured ndarray, shape (quads,)
         Of an aircraft with teetering rotors, else empty, as the next.
     coning_change : ndarray, shape (n_rotors, n)
+    wash : ndarray, shape (4, n_rotors, n)
+        What others add to the inflow of each rotor, as a part of it: uniform, sine and cosine part for its blades, over
+        kappa_i Omega R, in the order of `sbs_sim.model.state.INFLOW_NAMES`; and what other rotors add to the flow
+        through its disc, over Omega R. Of an aircraft without such, empty.
     commands : ndarray, shape (3 n_rows, n)
         Swashplate angles at the present airspeed, where they change with it; else empty.
     """
@@ -403,14 +437,16 @@ class Work(NamedTuple):
     shafts: NDArray[Any]
     coning: NDArray[Any]
     coning_change: Array
+    wash: Array
     commands: Array
 
 
 def state_size(model: Model) -> int:
-    """Numbers in the state of one aircraft: of the body, of blades by flap, lag and their rates, inflow, and drives."""
+    """Numbers in the state of one aircraft: of the body, of flap, lag and their rates, inflow, drives, contact."""
     drives = sum(int((model.drives[name] >= 0).sum()) for name in ("speed_index", "torque_index", "governor_index"))
     unseen = len(UNSEEN_NAMES) * len(model.drives)
-    return BODY_SIZE + int(4 * model.rotors["blades"].sum() + 3 * len(model.rotors)) + drives + unseen
+    contacts = CONTACT_STATES * len(model.contacts)
+    return BODY_SIZE + int(4 * model.rotors["blades"].sum() + 3 * len(model.rotors)) + drives + unseen + contacts
 
 
 def make_work(model: Model) -> Work:
@@ -443,6 +479,7 @@ def make_work(model: Model) -> Work:
         shafts=records(SHAFT, len(model.drives), n),
         coning=records(CONING, quads if teetering else 0, n),
         coning_change=aligned((len(rotors) if teetering else 0, n), float),
+        wash=aligned((WASH_ROWS, len(rotors) if model.switches["wash"][0] else 0, n), float),
         commands=aligned((_command_count(model), n), float),
     )
 

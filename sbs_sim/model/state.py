@@ -15,6 +15,9 @@ Drives stand behind all that (theory.md section 7.6): of each the speed of its f
 torque (N m), with a governor the integral part of its throttle. Behind these, and not in the linear state, follow of
 each drive the azimuth of its first rotor (rad), the share of the battery that is used up, and the share of the engine
 that has failed.
+
+Last are, of an aircraft that can stand on the ground, the deflections of each of its contact points along the ground
+(m), which the linear state does not have either.
 """
 
 import re
@@ -50,6 +53,8 @@ SPEED, ENGINE_TORQUE, GOVERNOR = DRIVE_NAMES = ("Omega", "engine_torque", "gover
 DRIVE_UNITS = {SPEED: "rad/s", ENGINE_TORQUE: "N m", GOVERNOR: "1"}
 UNSEEN_NAMES = ("azimuth", "discharge", "engine_failure")  # of a drive, and not in the linear state
 AZIMUTH, DISCHARGE, FAILURE = range(3)  # of UNSEEN_NAMES
+CONTACT_NAMES = ("contact_x", "contact_y")  # of a contact point
+CONTACT_STATES = len(CONTACT_NAMES)
 COMMAND_NAMES = ("throttle", "set_point")  # of a drive that pilot controls act on
 THROTTLE, SET_POINT = range(2)  # of COMMAND_NAMES
 ROW = len(SWASHPLATE_NAMES)  # numbers in a row of commands: a swashplate's, or a drive's and what is left at zero
@@ -148,10 +153,13 @@ class StateLayout:
         Number of blades of each rotor, in the order of the aircraft file.
     drives : tuple of tuple of str
         Of each drive those of `DRIVE_NAMES` that it has.
+    contacts : int
+        Number of points that can touch the ground.
     """
 
     blades: tuple[int, ...]
     drives: tuple[tuple[str, ...], ...] = ()
+    contacts: int = 0
 
     @cached_property
     def blade_count(self) -> int:
@@ -161,6 +169,11 @@ class StateLayout:
     @cached_property
     def size(self) -> int:
         """Length of the simulation state."""
+        return self.contacts_start + CONTACT_STATES * self.contacts
+
+    @cached_property
+    def contacts_start(self) -> int:
+        """Index of the first deflection of a contact point."""
         return self.drives_start + sum(map(len, self.drives)) + len(UNSEEN_NAMES) * len(self.drives)
 
     @cached_property
@@ -171,7 +184,7 @@ class StateLayout:
     @cached_property
     def linear_size(self) -> int:
         """Length of the linear state: 38 for two three-bladed rotors."""
-        return self.size - len(UNSEEN_NAMES) * len(self.drives) - BODY_SIZE + LINEAR_BODY_SIZE
+        return self.contacts_start - len(UNSEEN_NAMES) * len(self.drives) - BODY_SIZE + LINEAR_BODY_SIZE
 
     def _multiblade(self, block: int, rotor: int) -> slice:
         first = BODY_SIZE + block * self.blade_count + sum(self.blades[:rotor])
@@ -205,11 +218,17 @@ class StateLayout:
         places = {name: first + i for i, name in enumerate(self.drives[drive])}
         return places | {name: unseen + i for i, name in enumerate(UNSEEN_NAMES)}
 
+    def contact(self, point: int) -> slice:
+        """Indices of the deflections of one contact point along the ground in the simulation state [m]."""
+        first = self.contacts_start + CONTACT_STATES * point
+        return slice(first, first + CONTACT_STATES)
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the simulation state."""
         body = ("north", "east", "down", "qw", "qx", "qy", "qz", "u", "v", "w", "p", "q", "r")
         unseen = [f"{name}({i + 1})" for i in range(len(self.drives)) for name in UNSEEN_NAMES]
+        unseen += [f"{name}({i + 1})" for i in range(self.contacts) for name in CONTACT_NAMES]
         return body + self._rotor_names + self._drive_names + tuple(unseen)
 
     @cached_property

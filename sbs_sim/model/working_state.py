@@ -4,19 +4,25 @@ from sbs_sim.lanes import (
     Vector,
     add_to_quads,
     as_lanes,
+    dot,
     maximum,
     minimum,
     select,
     sqrt,
+    transposed,
     zeros_like,
 )
+from sbs_sim.model import state as S
 from sbs_sim.model.dynamics import in_lanes, memory_in_lanes
+from sbs_sim.model.frames import rotation
+from sbs_sim.model.ground_effect import ground_height
 from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.records import OTHERS
 from sbs_sim.model.trigonometry import TINY, angle_of, inverse_root
 
 # columns of a rotor's row
-ADVANCE_RATIO, HOVER_INFLOW, DESCENT, FLOW, STALLED, REVERSED, OUTSIDE = range(7)
-WORKING_SIZE = 7
+ADVANCE_RATIO, HOVER_INFLOW, DESCENT, FLOW, STALLED, REVERSED, OUTSIDE, HEIGHT = range(8)
+WORKING_SIZE = 8
 
 # rows of the stall angles
 NUMBER, HIGHEST, LOWEST, LEAST, MOST = range(5)
@@ -35,7 +41,8 @@ def working_state(model, work, out):
         Output: advance ratio; hover inflow ratio of the present thrust, a_w sqrt(2 |C_T|); velocity of the hub against
         the thrust and flow through the disc with it, both over the tip speed; shares of the disc, between flap hinge
         and tip, where sections are stalled, where the flow comes from behind, and where the Reynolds or Mach number
-        is outside of the airfoil's table, as the blades meet it now.
+        is outside of the airfoil's table, as the blades meet it now; height of the hub above the ground over the
+        radius.
     """
     aircraft, memory = in_lanes(model), memory_in_lanes(work)
     angles, rows = as_lanes(model.stall, aircraft.blades), as_lanes(out, aircraft.rotors)
@@ -43,6 +50,9 @@ def working_state(model, work, out):
         blade = aircraft.blades[r]
         fractions = disc_fractions(aircraft, blade, memory.terms[r], angles[r])
         add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "force", fractions)
+    ground = aircraft.ground[0]
+    down = transposed(rotation(S.attitude_at(memory.state))) @ ground.down
+    position = dot(ground.down, S.vector_at(memory.state, S.POSITION))
     for j in range(aircraft.rotors.shape[0]):
         rotor, row, flow = aircraft.rotors[j], rows[j], memory.flow[j].velocity
         thrust, scale = memory.totals[j].thrust, rotor.inverse_tip_speed
@@ -51,11 +61,15 @@ def working_state(model, work, out):
         row[ADVANCE_RATIO] = sqrt(flow.x * flow.x + flow.y * flow.y) * scale
         row[HOVER_INFLOW] = rotor.duct_expansion * sqrt(2.0 * abs(thrust) * rotor.coefficient_scale)
         row[DESCENT] = thrust_sign * through
-        row[FLOW] = thrust_sign * (memory.state[rotor.inflow] - through)
+        flow_through = memory.state[rotor.inflow] - through
+        if aircraft.switches[0].wash == 1:
+            flow_through = flow_through + memory.wash[OTHERS, j]
+        row[FLOW] = thrust_sign * flow_through
         found, area = Vector(0.0, 0.0, 0.0), zeros_like(scale)
         for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
             own = memory.hubs[quad]
             found, area = found + own.force, area + own.moment.x
+        row[HEIGHT] = ground_height(ground, rotor, position, down)
         row[STALLED], row[REVERSED], row[OUTSIDE] = found.x / area, found.y / area, found.z / area
 
 

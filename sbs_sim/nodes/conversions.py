@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from sbs_msgs.msg import (
     BodyState,
+    ContactState,
     Controls,
     DriveCommand,
     DriveState,
@@ -42,6 +43,7 @@ from sbs_sim.flight import validity
 from sbs_sim.flight.records import Event, Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
+from sbs_sim.model.contact import CONTACT_SIZE, DEPTH
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.state import harmonic_count
@@ -268,6 +270,7 @@ class StateMessages:
         self._firsts = np.cumsum([0, *aircraft.layout.blades]).tolist()
         count = len(aircraft.rotors)
         self.state = BodyState()
+        self.state.contacts = [ContactState() for _ in range(self._layout.contacts)]
         self.state.header.frame_id = FRAME_NED
         self.rotors = RotorStateArray(rotors=[_rotor_at_rest(rotor) for rotor in aircraft.rotors])
         self.rotors.drives = [DriveState() for _ in aircraft.drives]
@@ -284,6 +287,8 @@ class StateMessages:
             message.header.stamp = stamp
         values = snapshot.state.tolist()
         self._fill_state(values, snapshot.acceleration.tolist())
+        if snapshot.contact is not None:
+            self._fill_contacts(values, snapshot.contact.tolist())
         self._fill_odom(values)
         flaps, lags = self._blades.of(snapshot)
         loads = snapshot.loads.tolist()
@@ -305,6 +310,12 @@ class StateMessages:
         _set_vector(body.velocity, values[7:10])
         _set_vector(body.angular_velocity, values[10:13])
         _set_vector(body.acceleration, acceleration)
+
+    def _fill_contacts(self, values: list[float], rows: list[list[float]]) -> None:
+        for i, (contact, row) in enumerate(zip(self.state.contacts, rows, strict=True)):
+            _set_vector(contact.force, row[:DEPTH])
+            contact.depth = row[DEPTH]
+            contact.deflection_x, contact.deflection_y = values[self._layout.contact(i)]
 
     def _fill_drives(self, state: Array) -> None:
         for i, drive in enumerate(self.rotors.drives):
@@ -391,6 +402,13 @@ def snapshot_of(
     for i, drive in enumerate(rotors.drives):
         for name, place in layout.drive(i).items():
             state[place] = getattr(drive, DRIVE_FIELDS.get(name, name))
+    if len(body.contacts) != layout.contacts:
+        points = f"{len(body.contacts)} contact points, {aircraft.name} has {layout.contacts}"
+        raise SimulationError(f"the flight has {points}")
+    contact = np.zeros((layout.contacts, CONTACT_SIZE))
+    for i, point in enumerate(body.contacts):
+        state[layout.contact(i)] = point.deflection_x, point.deflection_y
+        contact[i] = *_triple(point.force), point.depth
     loads = np.zeros((count, R.LOAD_SIZE))
     for j, rotor in enumerate(rotors.rotors):
         state[layout.flap(j)], state[layout.flap_rate(j)] = rotor.flap, rotor.flap_rate
@@ -401,7 +419,7 @@ def snapshot_of(
         loads[j, R.MOMENT : R.MOMENT + 3] = _triple(rotor.hub.torque)
     acceleration = np.array(_triple(body.acceleration))
     azimuth = np.array([rotor.azimuth for rotor in rotors.rotors])
-    for values in (state, acceleration, azimuth, loads):
+    for values in (state, acceleration, azimuth, loads, contact):
         if not np.all(np.abs(values) < MAX_VALUE):  # false for a NaN as well
             raise SimulationError(f"the flight has numbers that are not finite or beyond {MAX_VALUE:g}")
     if not state[S.ATTITUDE : S.VELOCITY].any():
@@ -415,6 +433,7 @@ def snapshot_of(
         azimuth=azimuth,
         loads=loads,
         wind=wind,
+        contact=contact if layout.contacts else None,
     )
 
 

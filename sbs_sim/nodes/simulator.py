@@ -20,6 +20,7 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SbsError, SimulationError, TrimError
+from sbs_sim.flight.contact import state_on_ground
 from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP_DEG, FREE_METHOD, METHOD, METHODS, Simulation
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import MAX_SPEED, standing_state, trimmed_state
@@ -39,6 +40,7 @@ from sbs_sim.nodes.simulator_outputs import SimulatorOutputs
 OFF = "off"
 # How long a thread keeps the interpreter while the flight waits for it [s]; the 5 ms of Python are half a tick.
 SWITCH_INTERVAL = 0.5e-3
+DEFAULT_GROUND = -100.0  # m
 CONDITION = ("airspeed", "climb_rate", "sideslip", "turn_rate")
 COMPONENTS = ("simulator", "control_mixer", "analysis", "recorder")
 PARAMETERS = {
@@ -58,8 +60,17 @@ PARAMETERS = {
         0.0,
         MAX_SPEED,
     ),
+    "on_ground": Parameter(
+        False,
+        "At the start: stand on the ground with all controls at rest, instead of the trim; needs an aircraft with"
+        " ground.contact",
+    ),
     "ground_altitude": Parameter(
-        -100.0, "Height of the level ground above the origin [m]; contact stops the flight until a reset", -1e5, 1e5
+        DEFAULT_GROUND,
+        "Height of the ground above the origin [m]; without a choice that of the aircraft file, if it has one; a rotor"
+        " or c.g. that touches it stops the flight until a reset",
+        -1e5,
+        1e5,
     ),
     "real_time_factor": Parameter(
         1.0, "Simulation time over elapsed time; 0 is as fast as possible", 0.0, 1000.0, fixed=False
@@ -134,7 +145,10 @@ class Simulator(Component):
         wind = Wind(velocity=tuple(values["wind"]))
         condition = [values[name] for name in CONDITION]
         position, start = (0.0, 0.0, -values["altitude"]), (values["heading"], wind.velocity, values["rotor_speed"])
-        state, controls = self._beginning(condition, position, *start)
+        self._ground = values["ground_altitude"]
+        if self._ground == DEFAULT_GROUND and self.aircraft.ground.altitude is not None:
+            self._ground = self.aircraft.ground.altitude
+        state, controls = self._beginning(condition, position, *start, values["on_ground"])
         simulation = Simulation(
             self.aircraft,
             state,
@@ -143,29 +157,42 @@ class Simulator(Component):
             method=values["method"],
             azimuth_step=math.radians(values["azimuth_step_deg"]),
             wind=wind,
-            ground_altitude=values["ground_altitude"],
+            ground_altitude=self._ground,
             **self._fidelity,
         )
         shown = ", ".join(
             f"{control.name} {control.shown(value):.3f} {control.shown_unit}"
             for control, value in zip(self.aircraft.controls, controls.tolist(), strict=True)
         )
-        begins = "on its stand" if self.aircraft.body.is_stand else "trimmed"
+        begins = (
+            "on its stand" if self.aircraft.body.is_stand else "on the ground" if values["on_ground"] else "trimmed"
+        )
         self.get_logger().info(f"{self.aircraft.name} {begins} with {shown}, flies by {simulation.options['method']}")
         return simulation
 
     def _beginning(
-        self, condition: Sequence[float], position: Any, heading: float, wind: Any, rotor_speed: float
+        self,
+        condition: Sequence[float],
+        position: Any,
+        heading: float,
+        wind: Any,
+        rotor_speed: float,
+        on_ground: bool,
     ) -> tuple[Any, Any]:
-        """State and pilot controls with which a flight begins: trimmed, or with controls at their rest on a stand."""
-        if not self.aircraft.body.is_stand:
+        """State and pilot controls with which a flight begins: trimmed, or with controls at rest where it stands."""
+        if not (self.aircraft.body.is_stand or on_ground):
             point = self._trim(*condition)
             return trimmed_state(self.aircraft, point, position, heading, wind, rotor_speed), point.controls
         for name, value in zip(CONDITION, condition, strict=True):
             if value != 0.0:
-                raise SimulationError(f"{name} = {value:g}: allowed is 0 for an aircraft on a stand")
+                where = "on the ground" if on_ground else "on a stand"
+                raise SimulationError(f"{name} = {value:g}: allowed is 0 for an aircraft {where}")
         low, high = np.array([control.range for control in self.aircraft.controls]).T
         controls = np.clip(self.aircraft.held_controls, low, high)
+        if on_ground:
+            if position[2] != 0.0:
+                raise SimulationError(f"height = {-position[2]:g}: allowed is 0 for an aircraft on the ground")
+            return state_on_ground(self.aircraft, self._ground, position[:2], heading, rotor_speed), controls
         return standing_state(self.aircraft, position, heading, rotor_speed), controls
 
     def _trim(self, airspeed: float, climb_rate: float, sideslip: float, turn_rate: float) -> TrimPoint:
@@ -204,7 +231,8 @@ class Simulator(Component):
                 return
             wind, position = self.loop.wind().velocity, point_array(request.position)
             condition = [getattr(request, name) for name in CONDITION]
-            state, controls = self._beginning(condition, position, request.heading, wind, request.rotor_speed)
+            start = request.heading, wind, request.rotor_speed, request.on_ground
+            state, controls = self._beginning(condition, position, *start)
             self.loop.reset(state, self.aircraft.mix(controls))
 
         return self.answer(response, reset, "reset", request)
@@ -259,6 +287,8 @@ def check_reset(request: Reset.Request) -> None:
     position = point_array(request.position)
     unused = {name: getattr(request, name) for name in (*CONDITION, "heading")}
     unused |= {f"position.{axis}": float(value) for axis, value in zip("xyz", position, strict=True)}
+    if request.on_ground:
+        raise SimulationError("on_ground = true: not allowed with from_state = true, the state has its own")
     usual = {"rotor_speed": 1.0}
     for name, value in (unused | {"rotor_speed": request.rotor_speed}).items():
         if value != usual.get(name, 0.0):

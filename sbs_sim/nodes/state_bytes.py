@@ -15,6 +15,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.flight.records import Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
+from sbs_sim.model.contact import CONTACT_SIZE, DEPTH
 from sbs_sim.nodes.conversions import BladeAngles, StateMessages, enu_flu_quaternion, to_time
 from sbs_sim.nodes.templates import BYTE, COUNT, DOUBLE, INT, UINT, LayoutError, Template
 from sbs_sim.recording.recorded_flight import DRIVE_FIELDS
@@ -87,6 +88,7 @@ class StateBytes:
             "quaternion": 4,
             "flap": layout.blade_count,
             "lag": layout.blade_count,
+            "contact": CONTACT_SIZE * layout.contacts,
         }
         ends = np.cumsum(list(sizes.values()))
         parts = zip(sizes.items(), ends.tolist(), strict=True)
@@ -112,6 +114,8 @@ class StateBytes:
         np.multiply(snapshot.loads[:, R.TORQUE], self._speeds, out=source[parts["power"]])
         source[parts["quaternion"]] = enu_flu_quaternion(state[S.ATTITUDE : S.VELOCITY].tolist())
         source[parts["flap"]], source[parts["lag"]] = self._blades.of(snapshot)
+        if snapshot.contact is not None:
+            source[parts["contact"]] = snapshot.contact.ravel()
         stamp = to_time(snapshot.time)
         for write in self._writes:
             write(source, stamp)
@@ -129,12 +133,18 @@ class StateBytes:
         for i, axis in enumerate(axes):
             yield f"{name}.{axis}", (first + i, 1.0)
 
-    def _state_fields(self, _: Aircraft) -> Iterator[tuple[str, tuple[int, float]]]:
+    def _state_fields(self, aircraft: Aircraft) -> Iterator[tuple[str, tuple[int, float]]]:
         yield from self._vector("position", 0)
         yield from self._vector("attitude", S.ATTITUDE, QUATERNION)
         yield from self._vector("velocity", S.VELOCITY)
         yield from self._vector("angular_velocity", S.RATES)
         yield from self._vector("acceleration", self._at("acceleration"))
+        for i in range(aircraft.layout.contacts):
+            first, own = self._at("contact", CONTACT_SIZE * i), f"contacts[{i}]."
+            yield from self._vector(f"{own}force", first)
+            yield f"{own}depth", (first + DEPTH, 1.0)
+            for k, axis in enumerate("xy"):
+                yield f"{own}deflection_{axis}", (aircraft.layout.contact(i).start + k, 1.0)
 
     def _rotors_fields(self, aircraft: Aircraft) -> Iterator[tuple[str, tuple[int, float]]]:
         first_blade, layout = 0, aircraft.layout

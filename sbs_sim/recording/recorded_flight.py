@@ -203,6 +203,9 @@ def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, A
     for i in range(len(layout.drives)):
         for name, place in layout.drive(i).items():
             states[:, place] = rotors[f"drives[{i}].{DRIVE_FIELDS.get(name, name)}"][where[1]]
+    for i in range(layout.contacts):
+        for axis, place in zip("xy", range(layout.size)[layout.contact(i)], strict=True):
+            states[:, place] = body[f"contacts[{i}].deflection_{axis}"][where[0]]
     return np.round(times * 1e-9 / step_size).astype(np.int64), states
 
 

@@ -96,6 +96,8 @@ def schema_keys():
     surface, fuselage = schema["body"]["properties"]["surfaces"]["items"], schema["body"]["properties"]["fuselage"]
     keys |= {f"surfaces.{key}" for key in surface["properties"]} | {f"fuselage.{key}" for key in fuselage["properties"]}
     keys |= {f"wash.{key}" for key in surface["properties"]["wash"]["properties"]}
+    keys |= {f"ground.{key}" for key in schema["ground"]["properties"]}
+    keys |= {f"contact_points.{key}" for key in schema["contact_points"]["items"]["properties"]}
     return keys | {f"rotors.{key}" for key in schema["rotors"]["items"]["properties"]}
 
 

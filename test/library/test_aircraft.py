@@ -378,6 +378,7 @@ def schema_leaves(schema, path=()):
 
 # in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py
 ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage", "flap_hinge", "schedule")
+ELSEWHERE += ("ground", "contact_points")
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)

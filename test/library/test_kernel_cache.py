@@ -25,7 +25,8 @@ from sbs_sim.model.ground import lowest_point
 state = np.zeros(49)
 state[2:4] = -30.0, 1.0
 out = np.zeros((1, 1))
-lowest_point(Aircraft.load("sbs").model().rotors, state[:, np.newaxis], out)
+model = Aircraft.load("sbs").model()
+lowest_point(model.ground, model.rotors, state[:, np.newaxis], out)
 print(out[0, 0])
 """
 

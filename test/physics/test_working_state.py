@@ -36,7 +36,7 @@ def working(model):
 def deepest(model, x):
     """Down coordinate of the lowest point [m]."""
     out = model.engine.memory(1)
-    lowest_point(model.engine.model.rotors, model.lanes(x), out)
+    lowest_point(model.engine.model.ground, model.engine.model.rotors, model.lanes(x), out)
     return float(out[0, 0])
 
 

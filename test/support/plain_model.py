@@ -22,6 +22,7 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
+from plain_ground import contact, ground_washes
 from plain_parts import part_loads
 from scipy.interpolate import CubicHermiteSpline
 
@@ -145,6 +146,8 @@ def split_state(ac, x, lead_lag=True, cyclic_inflow=True):
             start += rotor.blades
     kept = np.array([1.0, 1.0, 1.0]) if cyclic_inflow else np.array([1.0, 0.0, 0.0])
     parts["inflow"] = [x[start + 3 * j : start + 3 * j + 3] * kept for j in range(len(ac.rotors))]
+    if stands_on_ground(ac):  # the deflections of its contact points stand behind
+        x = x[: len(x) - 2 * len(ac.contact_points)]
     if len(x) != start + 3 * len(ac.rotors):
         raise ValueError(f"state of length {len(x)}, expected {start + 3 * len(ac.rotors)}")
     return SimpleNamespace(position=x[0:3], quaternion=x[3:7], velocity=x[7:10], rate=x[10:13], **parts)
@@ -185,6 +188,11 @@ def mass_points(rotor, second_moment=None):
     integrals = [rotor.blade_mass, rotor.blade_mass * rotor.blade_cg, second_moment]
     masses = np.linalg.solve(np.vander(stations, increasing=True).T, integrals)
     return list(zip(stations, masses, strict=True))
+
+
+def stands_on_ground(ac):
+    """Return whether contact points carry it (section 7.7)."""
+    return getattr(ac, "has_contact", False)
 
 
 def stands(ac):
@@ -508,7 +516,19 @@ def flat_plate_force(ac, air_velocity):
 # ------------------------------------------------------------------------------------------------------------
 
 
-def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_inflow):
+class Wash(NamedTuple):
+    """What others add to the inflow of a rotor, as a part of it."""
+
+    blades: np.ndarray  # lambda0, lambdas, lambdac for the blades
+    through: float  # of other rotors, through the disc
+
+
+def all_washes(ac, inflow, hub_velocities):
+    """Return the `Wash` of every rotor."""
+    return [Wash(np.zeros(3), 0.0) for _ in ac.rotors]
+
+
+def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_inflow, through=0.0):
     """Return d/dt of lambda0, lambdas, lambdac [1/s], Peters and HaQuang's three states.
 
     Without cyclic inflow the equation left is momentum theory's, M00 lambda0'/Omega + V_T lambda0 / L00 =
@@ -526,6 +546,8 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
     air_velocity_hub : array, shape (3,)
         [m/s], body axes.
     cyclic_inflow : bool
+    through : float
+        What other rotors add to the flow through the disc, over the tip speed.
 
     Returns
     -------
@@ -550,7 +572,7 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
 
     met = met_velocity(rotor, air_velocity_hub)
     mu_x, mu_y = x_hub @ met / tip_speed, y_hub @ met / tip_speed
-    mu_z = -u @ air_velocity_hub / tip_speed
+    mu_z = -u @ air_velocity_hub / tip_speed - through
     lambda0 = inflow[0]
     lam = lambda0 - mu_z
     mu2 = mu_x**2 + mu_y**2
@@ -573,7 +595,8 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
     if not cyclic_inflow:
         drain[0] = v_t * lambda0 / gain[0, 0]
     if rotor.duct_exit is not None:
-        drain[0] = duct_pressures(ac, rotor, lambda0, air_velocity_hub)[0] / force_scale
+        met_by_duct = air_velocity_hub + tip_speed * through * u
+        drain[0] = duct_pressures(ac, rotor, lambda0, met_by_duct)[0] / force_scale
     rate_0, rate_c, rate_s = omega * (coefficients - drain) / mass
     return np.array([rate_0, rate_s * cyclic_inflow, rate_c * cyclic_inflow])
 
@@ -598,6 +621,7 @@ class Instant(NamedTuple):
     pitches: list  # over rotors, over blades, of pairs: pitch at the hinge [rad] and its rate [rad/s]
     state: object  # `split_state`
     hub_velocities: list  # over rotors, relative to the air, body axes [m/s]
+    washes: list  # over rotors, see `Wash`
     conings: list  # over rotors, of pairs: mean flap angle [rad] and rate [rad/s]
 
 
@@ -694,7 +718,8 @@ def fixed_exit_load(instant, j):
     """Return force [N] and moment [N m] about the origin of a duct with a fixed exit: thrust and ram drag."""
     ac, rotor = instant.ac, instant.ac.rotors[j]
     u, hub = (np.asarray(values, dtype=float) for values in (rotor.shaft_direction, rotor.hub))
-    _, thrust, mass_flow = duct_pressures(ac, rotor, instant.state.inflow[j][0], instant.hub_velocities[j])
+    met_by_duct = instant.hub_velocities[j] + inflow_speed(rotor) * rotor.radius * instant.washes[j].through * u
+    _, thrust, mass_flow = duct_pressures(ac, rotor, instant.state.inflow[j][0], met_by_duct)
     along = instant.hub_velocities[j] - u * (u @ instant.hub_velocities[j])
     drag = -mass_flow * rotor.duct_turning * along
     return thrust * u + drag, cross(hub, thrust * u) + cross(hub + rotor.lip_arm * u, drag)
@@ -857,10 +882,17 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
     blades = make_blades(ac, state, psi)
     part_force, part_moment = part_loads(ac, air_velocity, state.rate, state.inflow)
     hub_velocities = [air_velocity + cross(state.rate, np.asarray(rotor.hub, dtype=float)) for rotor in ac.rotors]
+    washes = all_washes(ac, state.inflow, hub_velocities)
+    if getattr(getattr(ac, "ground", None), "effect", "none") != "none":
+        taken = ground_washes(ac, state, attitude, hub_velocities)
+        washes = [wash._replace(blades=wash.blades + own) for wash, own in zip(washes, taken, strict=True)]
+    if stands_on_ground(ac):
+        ground = contact(ac, np.asarray(x), attitude)
+        part_force, part_moment = part_force + ground[0], part_moment + ground[1]
     air_loads = []
     for j, rotor in enumerate(ac.rotors):
-        met = met_velocity(rotor, hub_velocities[j])
-        air_loads.append([blade_air_loads(ac, blade, swash[j], state.inflow[j], met) for blade in blades[j]])
+        met, inflow = met_velocity(rotor, hub_velocities[j]), state.inflow[j] + washes[j].blades
+        air_loads.append([blade_air_loads(ac, blade, swash[j], inflow, met) for blade in blades[j]])
     return Instant(
         ac=ac,
         lead_lag=lead_lag,
@@ -874,6 +906,7 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
         pitches=[[hinge_pitch(blade, swash[j]) for blade in own] for j, own in enumerate(blades)],
         state=state,
         hub_velocities=hub_velocities,
+        washes=washes,
         conings=[(flap[0], rate[0]) for flap, rate in zip(state.flap, state.flap_rate, strict=True)],
     )
 
@@ -938,6 +971,7 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
                 state.inflow[j],
                 instant.hub_velocities[j],
                 cyclic_inflow,
+                instant.washes[j].through,
             )
         )
         force, moment = hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd[j], lag_dd[j])

@@ -191,7 +191,7 @@ def state(name: str, height: float) -> np.ndarray:
     """Trimmed state whose lowest point is at a height above the ground [m]."""
     values = trimmed_state(AIRCRAFT, TRIMS[name])
     deepest = np.zeros((1, 1))
-    lowest_point(AIRCRAFT.model().rotors, values[:, np.newaxis], deepest)
+    lowest_point(AIRCRAFT.model().ground, AIRCRAFT.model().rotors, values[:, np.newaxis], deepest)
     values[2] = -GROUND - height - deepest[0, 0]
     return values
 

@@ -23,6 +23,7 @@ RESERVED_NAMES = frozenset(
     | {"roll", "heading", "airspeed", "climb_rate", "turn_rate", "residual", "acceleration", "warnings"}
 ) - {*CONTROL_NAMES}
 MIN_LENGTH = 1e-6  # m, of a damper
+STOP_FREQUENCY = 6.0  # per revolution, of a blade on a lag stop: the default step has 25 a revolution
 LINE, TABLE = ("root", "tip"), ("stations", "values")  # the two ways to give values along the blade
 
 
@@ -125,6 +126,7 @@ def consistency_problems(aircraft: "Aircraft") -> list[str]:
     for i, rotor in enumerate(aircraft.rotors):
         problems += [f"rotors[{i}].{problem}" for problem in _rotor_problems(rotor)]
         problems += _section_problems(aircraft, i)
+        problems += [f"rotors[{i}].{problem}" for problem in _lag_stop_problems(aircraft, rotor)]
     names = [rotor.name for rotor in aircraft.rotors]
     surfaces = [surface.name for surface in aircraft.body.surfaces]
     named = [("name", aircraft.name), *((f"rotors[{i}].name", name) for i, name in enumerate(names))]
@@ -320,6 +322,39 @@ def _teeter_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
         (aircraft.options.coupling == "complete", "options.coupling is paper: allowed is complete"),
     ]
     return [f"flap_hinge = 'teetering', {text}" for is_met, text in relations if not is_met]
+
+
+def _lag_stop_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
+    """Stops must leave the blade room, and be soft enough for the default step (theory.md section 3.5)."""
+    spring, damping = rotor.lag_stop_spring, rotor.lag_stop_damping
+    if rotor.lag_stops is None:
+        return ["lag_stop.range_deg: missing key"] if spring or damping else []
+    if not rotor.lag_stops[0] < 0.0 < rotor.lag_stops[1]:
+        shown = [round(math.degrees(end), 9) for end in rotor.lag_stops]
+        return [f"lag_stop.range_deg = {shown}: allowed are a negative and a positive end"]
+    inertia = _moved_by_lag(aircraft, rotor)
+    most = inertia * (STOP_FREQUENCY * rotor.speed) ** 2
+    if not 0.0 < spring <= most:
+        text = f"{STOP_FREQUENCY:g} per revolution on the inertia that lag moves, {inertia:.6g} kg m^2"
+        return [f"lag_stop.stiffness = {spring:g}: allowed is > 0 and up to {most:.6g}, {text}"]
+    most = 2.0 * math.sqrt(spring * inertia)
+    if damping > most * (1 + 1e-9):
+        return [f"lag_stop.damping = {damping:g}: allowed is up to {most:.6g}, at which a stop does not swing"]
+    return []
+
+
+def _moved_by_lag(aircraft: "Aircraft", rotor: Rotor) -> float:
+    """Inertia that all blades together move about their lag hinges, with a drive that gives way [kg m^2]."""
+    e_l, e_f = rotor.hinge_offset - rotor.flap_hinge_offset, rotor.flap_hinge_offset
+    inertia, moment = rotor.lag_inertia, e_l * (rotor.blade_mass * e_f + rotor.first_moment)
+    for drive in aircraft.drives:
+        if rotor.name in drive.rotors:
+            driven = [one for one in aircraft.rotors if one.name in drive.rotors]
+            first = next((one for one in driven if one.name == drive.rotors[0]), rotor)
+            blades = sum(one.blades * (one.speed / first.speed) ** 2 for one in driven)
+            about_axis = rotor.blade_mass * e_l**2 + 2.0 * moment + inertia
+            inertia -= (inertia + moment) ** 2 / (about_axis + drive.inertia / blades)
+    return float(inertia)
 
 
 def _schedule_problems(entry: MixingSchedule) -> list[str]:

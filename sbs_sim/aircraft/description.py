@@ -586,6 +586,35 @@ class Rotor(ByContent):
     damper_c: float = _linkage("c", "Linkage: its end on the hub, inboard of the hinges")
     damper_d: float = _linkage("d", "Linkage: its end on the blade, ahead of the hinges against lag")
     damper_r: float = _linkage("r", "Linkage: lever of the end on the hub, which turns with the pitch")
+    lag_stops: Range | None = interval(
+        "Lag angles between which no stop touches the blade, leading is negative; without it there are no stops",
+        -85,
+        85,
+        "deg",
+        key="lag_stop.range_deg",
+        symbol=r"\xi_1, \xi_2",
+        default=None,
+    )
+    lag_stop_spring: float = number(
+        "Stiffness of the lag stops",
+        0,
+        1e9,
+        "N m/rad",
+        key="lag_stop.stiffness",
+        symbol="K_s",
+        model_field="lag_stop_spring",
+        default=0.0,
+    )
+    lag_stop_damping: float = number(
+        "Damping of the lag stops",
+        0,
+        1e9,
+        "N m s/rad",
+        key="lag_stop.damping",
+        symbol="C_s",
+        model_field="lag_stop_damping",
+        default=0.0,
+    )
     pitch_flap_coupling: float = number(
         "Blade pitch taken off per flap angle",
         -10,
@@ -757,6 +786,12 @@ class Rotor(ByContent):
         if self.blade_inertia is not None:
             return self.blade_inertia
         return self.blade_mass * (self.blade_length * self.blade_length) / 3
+
+    @property
+    def lag_inertia(self) -> float:
+        """A2 of a blade about its lag hinge without flap [kg m^2]."""
+        e_f = self.flap_hinge_offset
+        return self.blade_mass * e_f**2 + 2.0 * e_f * self.first_moment + self.second_moment
 
     @property
     def is_teetering(self) -> bool:

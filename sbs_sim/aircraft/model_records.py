@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 SECONDS_PER_HOUR = 3600.0
+NO_STOP = 1e6  # rad
 MIN_DENSITY = 1e-12  # kg/m^3, less than at 300 km: below it is vacuum
 
 
@@ -132,6 +133,7 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["lead_lag"] = switches["cyclic_inflow"] = 1
     switches["complete_coupling"] = aircraft.options.coupling == "complete"
     switches["axial_dampers"] = any(rotor.damper_damping > 0.0 for rotor in aircraft.rotors)
+    switches["lag_stops"] = any(rotor.lag_stops is not None for rotor in aircraft.rotors)
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
     switches["stand"] = aircraft.body.is_stand
     switches["scheduled"] = any(rotor.schedule for rotor in aircraft.rotors)
@@ -188,6 +190,7 @@ def _blade_values(aircraft: "Aircraft", rotor: Rotor, number: int, grid: Grid) -
         **model_values(rotor, R.BLADE),
         "lag_damping": factor * rotor.lag_damping,
         "damper_damping": factor * rotor.damper_damping,
+        **_lag_stops(rotor),
         "rotor_speed": _kept_speed(aircraft, rotor),
         "inflow_speed": rotor.induced_power_factor * rotor.speed,
         "duct_turning": _turning(rotor),
@@ -209,6 +212,12 @@ def _blade_values(aircraft: "Aircraft", rotor: Rotor, number: int, grid: Grid) -
         "min_number": grid.range[0],
         "max_number": grid.range[1],
     }
+
+
+def _lag_stops(rotor: Rotor) -> dict[str, float]:
+    """Where the stops of a blade are, and what they are made of; without them it never comes there."""
+    first, last = rotor.lag_stops or (-NO_STOP, NO_STOP)
+    return {"lag_stop_first": first, "lag_stop_last": last}
 
 
 def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:

@@ -46,6 +46,7 @@ from sbs_sim.model.blade import (
     section_flow,
     to_blade,
     with_axial_damper,
+    with_lag_stops,
 )
 from sbs_sim.model.duct import duct_flow, duct_thrust, sheltered
 from sbs_sim.model.frames import quaternion_rates, rotation, shaft_down
@@ -401,6 +402,8 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
     moments = hinge_moments(blade, basis, pose, loads, own.hinge + at_hinges, own.slope)
     if aircraft.switches[0].axial_dampers == 1:
         moments = with_axial_damper(blade, basis, pose, moments, pitch, pitch_rate(aircraft, blade, pose, swash))
+    if aircraft.switches[0].lag_stops == 1:
+        moments = with_lag_stops(blade, pose, moments)
     flap, lag = hinge_columns(blade, basis)
     flap, lag = about_cg(blade, basis, flap), about_cg(blade, basis, lag)
     known = about_cg(blade, basis, known_loads(blade, basis, loads, own.hinge + at_hub, own.slope))

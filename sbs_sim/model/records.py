@@ -41,6 +41,7 @@ SWITCHES = {
     "complete_coupling": INTEGER,
     "complete_hub_moment": INTEGER,
     "axial_dampers": INTEGER,  # 1 where a rotor has them
+    "lag_stops": INTEGER,
     "stand": INTEGER,
     "scheduled": INTEGER,  # 1 where shares in swashplate angles change with the airspeed
     "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
@@ -104,6 +105,10 @@ BLADE = {
     "damper_c": LANES,
     "damper_d": LANES,
     "damper_r": LANES,
+    "lag_stop_first": LANES,  # angles beyond which the blade meets the stops [rad]
+    "lag_stop_last": LANES,
+    "lag_stop_spring": LANES,
+    "lag_stop_damping": LANES,
     "pitch_flap_coupling": LANES,
     "pitch_lag_coupling": LANES,
     "cos_phase": LANES,  # of the swashplate

@@ -414,6 +414,7 @@ OPTIONAL = {
     "lag_rest_deg",
     "blade_lag_damping",
     "lag_damper",
+    "lag_stop",
     "duct",
     "stations",
     "values",
@@ -490,6 +491,10 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
         assert path[:3] == ("rotors", 0, "mixing") or OPTIONAL & set(path), "a key that sbs.yaml does not show"
     if path[2:3] == ("lag_damper",):
         data["rotors"][0]["lag_damper"] = {"c": 0.02, "d": 0.03}
+    if path[2:3] == ("lag_stop",):
+        data["rotors"][0]["lag_stop"] = {"range_deg": [-11.0, 14.0], "stiffness": 30.0, "damping": 0.1}
+        aircraft, value = Aircraft.from_dict(data), get(data, path)
+        everything, arrays = flattened(aircraft), model_arrays(aircraft)
     if path[2:3] == ("duct",):
         data["rotors"][0]["duct"] = {"exit_area": 0.9}
         aircraft, value = Aircraft.from_dict(data), 0.9
@@ -705,6 +710,23 @@ REFUSED = {
         (*R0, "lag_damper"),
         {"damping": 5.0},
         "rotors[0].lag_damper.damping = 5.0: allowed is 0 where both ends of the damper are in one place",
+    ),
+    "lag stops on one side": (
+        (*R0, "lag_stop"),
+        {"range_deg": [1.0, 9.0], "stiffness": 30.0},
+        "rotors[0].lag_stop.range_deg = [1.0, 9.0]: allowed are a negative and a positive end",
+    ),
+    "lag stops too stiff for the default step": (
+        (*R0, "lag_stop"),
+        {"range_deg": [-9.0, 9.0], "stiffness": 1e6},
+        "rotors[0].lag_stop.stiffness = 1e+06: allowed is > 0 and up to 23859.5, 6 per revolution on the inertia"
+        " that lag moves, 0.0104925 kg m^2",
+    ),
+    "lag stops without a range": ((*R0, "lag_stop"), {"stiffness": 9.0}, "rotors[0].lag_stop.range_deg: missing key"),
+    "lag stops that creep back": (
+        (*R0, "lag_stop"),
+        {"range_deg": [-9.0, 9.0], "stiffness": 1000.0, "damping": 10.0},
+        "rotors[0].lag_stop.damping = 10: allowed is up to 6.47843, at which a stop does not swing",
     ),
     "no rotors": (("rotors",), [], "rotors = []: allowed is a list of at least 1"),
     "sense of rotation": ((*R0, "rotation"), 2, "rotors[0].rotation = 2: allowed is one of 1, -1"),

@@ -157,6 +157,11 @@ AIRCRAFT = {
         "every_rotor": ODD_BLADE | {"blades": 4},
         "rotors": [{"blade_lag_damping": [1.0, 0.0, 2.0, 0.5]}, {"lag_damper": {"damping": 0.0}}],
     },
+    # about half of the blades of a random state are beyond a stop, some of them on their way back
+    "lag_stops": {
+        "every_rotor": ODD_BLADE,
+        "rotors": [{"lag_stop": {"range_deg": [-3.0, 1.5], "stiffness": 900.0, "damping": 3.0}}, {}],
+    },
     "tandem": {"rotors": [{"hub": [0.9, 0.0, -0.1]}, {"hub": [-0.9, 0.0, -0.3]}]},
     "single_upside_down": {"rotors": [{"hub": [0.1, 0.2, 0.3], "shaft_direction": [0.0, 0.0, 1.0]}]},
     # every section at a Reynolds number beyond the table's, above and below

@@ -740,8 +740,20 @@ def hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, 
     flap = blade.f @ about_flap - rotor.flap_spring * (blade.flap - rotor.flap_rest)
     lag = -rotor.rotation * blade.u @ about_lag - rotor.lag_spring * (blade.lag - rotor.lag_rest)
     flap_damper, lag_damper = damper_moments(rotor, blade, instant.pitches[j][k])
+    lag += lag_stop_moment(rotor, blade)
     factor = 1.0 if rotor.blade_lag_damping is None else rotor.blade_lag_damping[k]
     return flap + factor * flap_damper, lag + factor * (lag_damper - rotor.lag_damping * blade.lag_rate)
+
+
+def lag_stop_moment(rotor, blade):
+    """Return the moment [N m] of the lag stops that raises the lag angle: spring and damper, that never pull."""
+    if getattr(rotor, "lag_stops", None) is None:
+        return 0.0
+    for sign, end in zip((1.0, -1.0), reversed(rotor.lag_stops), strict=True):
+        beyond, rate = sign * (blade.lag - end), sign * blade.lag_rate
+        if beyond > 0:
+            return -sign * max(0.0, rotor.lag_stop_spring * beyond + rotor.lag_stop_damping * rate)
+    return 0.0
 
 
 def damper_length(rotor, flap, lag, pitch):

@@ -436,6 +436,9 @@ MASS_RULES = {
 }
 
 
+STATION_SYMBOLS = {"chord": "c", "quarter_chord": "x_c", "chordwise_cg": "x_m"}
+
+
 def _stations(key: str, more: str = "increasing; in place of root and tip") -> Any:
     """Field with the stations of a table along the blade."""
     return declared(
@@ -444,7 +447,7 @@ def _stations(key: str, more: str = "increasing; in place of root and tip") -> A
         frozen,
         unit="1",
         key=f"{key}.stations",
-        symbol="c" if key == "chord" else "",
+        symbol=STATION_SYMBOLS.get(key, ""),
         default=None,
         is_physics=key not in DERIVED_FROM,
     )
@@ -534,6 +537,14 @@ class Rotor(ByContent):
         " flap_rest_deg",
         ("each", "teetering"),
         default="each",
+    )
+    undersling: float = number(
+        "Height of a teetering hinge over the point where the pitch axes of the blades meet",
+        -5,
+        5,
+        "m",
+        symbol="h_u",
+        default=0.0,
     )
     flap_spring: float = number(
         "Stiffness of the flap hinge", 0, 1e9, "N m/rad", symbol=r"K_\beta", model_field="flap_spring"
@@ -638,6 +649,39 @@ class Rotor(ByContent):
     twist_tip: float | None = number("Twist at the tip", -90, 90, "deg", key="twist_deg.tip", default=None)
     twist_stations: Array | None = _stations("twist_deg")
     twist_values: Array | None = _station_values("Twist", -90, 90, "deg", key="twist_deg.values")
+    quarter_root: float | None = number(
+        "Offset of the quarter chord at the flap hinge, ahead of the pitch axis, linear to the tip; 0 if left out",
+        -10,
+        10,
+        "m",
+        key="quarter_chord.root",
+        symbol="x_c",
+        default=None,
+    )
+    quarter_tip: float | None = number(
+        "Offset of the quarter chord at the tip", -10, 10, "m", key="quarter_chord.tip", symbol="x_c", default=None
+    )
+    quarter_stations: Array | None = _stations("quarter_chord")
+    quarter_values: Array | None = _station_values(
+        "Offset of the quarter chord", -10, 10, "m", key="quarter_chord.values", symbol="x_c"
+    )
+    centre_root: float | None = number(
+        "Offset of the sections' centres of gravity at the flap hinge, ahead of the pitch axis, linear to the tip; 0"
+        " if left out",
+        -10,
+        10,
+        "m",
+        key="chordwise_cg.root",
+        symbol="x_m",
+        default=None,
+    )
+    centre_tip: float | None = number(
+        "Offset of the centre of gravity at the tip", -10, 10, "m", key="chordwise_cg.tip", symbol="x_m", default=None
+    )
+    centre_stations: Array | None = _stations("chordwise_cg")
+    centre_values: Array | None = _station_values(
+        "Offset of the sections' centres of gravity", -10, 10, "m", key="chordwise_cg.values", symbol="x_m"
+    )
     root_cutout: float = number(
         "Distance from the flap hinge to where the blade's profile begins", 0, 50, "m", symbol="r_c"
     )
@@ -754,6 +798,33 @@ class Rotor(ByContent):
             return np.interp((self.hinge_offset + share * self.blade_length) / self.radius, stations, values)
         assert root is not None and tip is not None, "checked with the file"  # noqa: PT018
         return root + share * (tip - root)
+
+    def quarter_at(self, share: Any) -> Any:
+        """Offset of the quarter chord ahead of the pitch axis [m], as `chord_at`."""
+        ends = self.quarter_root or 0.0, self.quarter_tip or 0.0
+        return self._along(share, *ends, self.quarter_stations, self.quarter_values)
+
+    def centre_at(self, share: Any) -> Any:
+        """Offset of the sections' centres of gravity ahead of the pitch axis [m], as `chord_at`."""
+        ends = self.centre_root or 0.0, self.centre_tip or 0.0
+        return self._along(share, *ends, self.centre_stations, self.centre_values)
+
+    def sweep_at(self, share: Any) -> Any:
+        """Sweep of the quarter-chord line [rad], aft positive; of a table the slope of its line there."""
+        length = self.blade_length
+        if self.quarter_stations is None or self.quarter_values is None:
+            slope = ((self.quarter_tip or 0.0) - (self.quarter_root or 0.0)) / length
+            return np.full(np.shape(share), -math.atan(slope))
+        places = self.quarter_stations * self.radius
+        slopes = np.concatenate([[0.0], np.diff(self.quarter_values) / np.diff(places), [0.0]])
+        radius = self.hinge_offset + np.asarray(share) * length
+        return -np.arctan(slopes[np.searchsorted(places, radius, side="right")])
+
+    @property
+    def has_offsets(self) -> bool:
+        """Quarter chord or mass of its blades are not on a pitch axis through the flap hinge."""
+        given = (self.quarter_root, self.quarter_stations, self.centre_root, self.centre_stations)
+        return self.undersling != 0.0 or any(value is not None for value in given)
 
     @property
     def airfoil_names(self) -> tuple[str, ...]:

@@ -243,7 +243,7 @@ def with_axial_damper(blade, basis, pose, moments, pitch, pitch_rate):
 
 @kernel
 def with_lag_stops(blade, pose, moments):
-    """Hinge moments with those of the lag stops, eq. (3.12): they push, and never pull.
+    """Hinge moments with those of the lag stops, eq. (3.13): they push, and never pull.
 
     Parameters
     ----------

@@ -378,6 +378,7 @@ def schema_leaves(schema, path=()):
 
 # in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py
 ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage", "flap_hinge", "schedule")
+ELSEWHERE += ("quarter_chord", "chordwise_cg", "undersling")
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)
@@ -710,6 +711,31 @@ REFUSED = {
         (*R0, "lag_damper"),
         {"damping": 5.0},
         "rotors[0].lag_damper.damping = 5.0: allowed is 0 where both ends of the damper are in one place",
+    ),
+    "quarter chord without a tip": ((*R0, "quarter_chord"), {"root": 0.01}, "rotors[0].quarter_chord.tip: missing key"),
+    "table of the c.g. with a value too many": (
+        (*R0, "chordwise_cg"),
+        {"stations": [0.2, 1.0], "values": [0.0, 0.01, 0.02]},
+        "rotors[0].chordwise_cg.values: allowed are 2 numbers, one of each station, not 3",
+    ),
+    "c.g. that no blade has": (
+        R0,
+        {
+            **sbs_data()["rotors"][0],
+            "blade_inertia": 0.0082,  # nearly all of it at the c.g.
+            "chordwise_cg": {"stations": [0.9, 1.0], "values": [0.0, 0.3]},
+        },
+        "rotors[0].chordwise_cg: no blade of this mass, c.g. and inertia has it; allowed with mass_distribution",
+    ),
+    "sweep of 80 degrees": (
+        (*R0, "quarter_chord"),
+        {"stations": [0.2, 0.9, 0.91, 1.0], "values": [0.0, 0.0, -0.03, -0.03]},
+        "rotors[0].quarter_chord: a sweep of 80.4 deg: allowed are up to 60",
+    ),
+    "undersling of a hinge of each blade": (
+        (*R0, "undersling"),
+        0.02,
+        "rotors[0].undersling = 0.02: allowed is 0 where flap_hinge is not teetering",
     ),
     "lag stops on one side": (
         (*R0, "lag_stop"),

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks, config_file, validation
 from sbs_sim.aircraft.airfoils import load_tables
+from sbs_sim.aircraft.blade_offsets import blade_moments
 from sbs_sim.aircraft.commands import Row, drive_offset, padded, rows_of, scheduled_controls
 from sbs_sim.aircraft.consistency import consistency_problems, table_problems
 from sbs_sim.aircraft.declaration import cached_by_class, declarations, frozen, schema_of, values_of
@@ -464,6 +465,10 @@ class Aircraft(Description):
             mass -= blades
             first -= blades * rotor.hub
             inertia -= _blades_inertia(rotor)
+            if rotor.has_offsets:
+                more_first, more_inertia = _offset_inertia(rotor)
+                first -= more_first
+                inertia -= more_inertia
         return mass, first, inertia
 
     def drive_speed(self, drive: int) -> float:
@@ -627,6 +632,20 @@ def _passages(rotor: Rotor) -> int:
     if not rotor.has_equal_blades:
         return 1
     return rotor.blades // 2 if rotor.blades % 2 == 0 else rotor.blades
+
+
+def _offset_inertia(rotor: Rotor) -> tuple[Array, Array]:
+    """What offsets of the blades add to the first moment about the c.g. and to `_blades_inertia`."""
+    moments, hub = blade_moments(rotor), rotor.hub
+    up = -hub_axes(rotor.shaft_direction)[:, 2]
+    along, mass = rotor.hinge_offset, rotor.blade_mass
+    normal = moments.normal_first + moments.height * mass  # along the shaft, undeflected and without pitch
+    height = moments.normal_second + moments.height * (2.0 * moments.normal_first + moments.height * mass)
+    extended = moments.second - rotor.second_moment + 2.0 * along * (moments.first - rotor.first_moment)
+    across = (extended + moments.chord_second) / 2.0  # the mean over the azimuth of the moment in the plane
+    crossed = np.outer(hub, up) * normal
+    second = across * (np.eye(3) - np.outer(up, up)) + height * np.outer(up, up) + crossed + crossed.T
+    return rotor.blades * normal * up, rotor.blades * (np.trace(second) * np.eye(3) - second)
 
 
 def _blades_inertia(rotor: Rotor) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 
 from sbs_sim import checks
 from sbs_sim.aircraft.blade_mass import MIN_BLADE_MASS
+from sbs_sim.aircraft.blade_offsets import blade_moments
 from sbs_sim.aircraft.description import CONTACT, STAND_AXES, TRIMMED_CONTROLS, Array, MixingSchedule, Range, Rotor
 from sbs_sim.aircraft.part_consistency import part_problems
 from sbs_sim.model.airfoil import FINEST_DEG, MAX_HALF, NUMBER_NAMES, common_half
@@ -23,7 +24,11 @@ RESERVED_NAMES = frozenset(
     | {"roll", "heading", "airspeed", "climb_rate", "turn_rate", "residual", "acceleration", "warnings"}
     | {"contact_force", "contact_depth"}
 ) - {*CONTROL_NAMES}
+MAX_SWEEP_DEG = 60.0
 MIN_LENGTH = 1e-6  # m, of a damper
+STOP_FREQUENCY = 6.0  # per revolution, of a blade on a lag stop: the default step has 25 a revolution
+TABLES = (("chord", "chord"), ("twist_deg", "twist"), ("quarter_chord", "quarter"), ("chordwise_cg", "centre"))
+REQUIRED_TABLES = ("chord", "twist_deg")
 LINE, TABLE = ("root", "tip"), ("stations", "values")  # the two ways to give values along the blade
 
 
@@ -32,7 +37,8 @@ def table_problems(rotors: Sequence[Rotor]) -> list[str]:
     problems = [
         f"rotors[{i}].{key}{problem}"
         for i, rotor in enumerate(rotors)
-        for key, name in (("chord", "chord"), ("twist_deg", "twist"))
+        for key, name in TABLES
+        if (key in REQUIRED_TABLES) or any(getattr(rotor, f"{name}_{part}") is not None for part in (*LINE, *TABLE))
         for problem in _table_problems(**{part: getattr(rotor, f"{name}_{part}") for part in (*LINE, *TABLE)})
     ] + [
         f"rotors[{i}].outboard_airfoils{problem}"
@@ -127,6 +133,8 @@ def consistency_problems(aircraft: "Aircraft") -> list[str]:
     for i, rotor in enumerate(aircraft.rotors):
         problems += [f"rotors[{i}].{problem}" for problem in _rotor_problems(rotor)]
         problems += _section_problems(aircraft, i)
+        problems += [f"rotors[{i}].{problem}" for problem in _lag_stop_problems(aircraft, rotor)]
+        problems += [f"rotors[{i}].{problem}" for problem in _offset_problems(aircraft, rotor)]
     names = [rotor.name for rotor in aircraft.rotors]
     surfaces = [surface.name for surface in aircraft.body.surfaces]
     named = [("name", aircraft.name), *((f"rotors[{i}].name", name) for i, name in enumerate(names))]
@@ -341,6 +349,67 @@ def _teeter_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
         (aircraft.options.coupling == "complete", "options.coupling is paper: allowed is complete"),
     ]
     return [f"flap_hinge = 'teetering', {text}" for is_met, text in relations if not is_met]
+
+
+def _offset_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
+    """Offsets from the pitch axis that no blade, or no equation here, can have."""
+    if not rotor.has_offsets or rotor.hinge_offset >= rotor.radius:
+        return []
+    if aircraft.options.coupling != "complete":
+        return [f"options.coupling = {aircraft.options.coupling!r}: allowed with offsets of the blade is complete"]
+    problems = []
+    if rotor.undersling and not rotor.is_teetering:
+        problems.append(f"undersling = {rotor.undersling:g}: allowed is 0 where flap_hinge is not teetering")
+    stations = np.unique(np.concatenate([[0.0, 1.0], *([] if rotor.quarter_stations is None else [_inner(rotor)])]))
+    sweep = math.degrees(float(np.abs(rotor.sweep_at((stations[1:] + stations[:-1]) / 2.0)).max()))
+    if sweep > MAX_SWEEP_DEG:
+        problems.append(f"quarter_chord: a sweep of {sweep:.3g} deg: allowed are up to {MAX_SWEEP_DEG:g}")
+    moments = blade_moments(rotor)
+    first = moments.vector()
+    about_centre = moments.matrix() - np.outer(first, first) / rotor.blade_mass
+    if np.linalg.eigvalsh(about_centre).min() < -1e-9 * moments.second:
+        problems.append("chordwise_cg: no blade of this mass, c.g. and inertia has it; allowed with mass_distribution")
+    return problems
+
+
+def _inner(rotor: Rotor) -> Array:
+    """Stations of the quarter chord as shares of the length from the flap hinge, those on the blade."""
+    assert rotor.quarter_stations is not None, "checked before"
+    shares = (rotor.quarter_stations * rotor.radius - rotor.hinge_offset) / rotor.blade_length
+    return np.asarray(shares[(shares > 0.0) & (shares < 1.0)])
+
+
+def _lag_stop_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
+    """Stops must leave the blade room, and be soft enough for the default step (theory.md section 3.5)."""
+    spring, damping = rotor.lag_stop_spring, rotor.lag_stop_damping
+    if rotor.lag_stops is None:
+        return ["lag_stop.range_deg: missing key"] if spring or damping else []
+    if not rotor.lag_stops[0] < 0.0 < rotor.lag_stops[1]:
+        shown = [round(math.degrees(end), 9) for end in rotor.lag_stops]
+        return [f"lag_stop.range_deg = {shown}: allowed are a negative and a positive end"]
+    inertia = _moved_by_lag(aircraft, rotor)
+    most = inertia * (STOP_FREQUENCY * rotor.speed) ** 2
+    if not 0.0 < spring <= most:
+        text = f"{STOP_FREQUENCY:g} per revolution on the inertia that lag moves, {inertia:.6g} kg m^2"
+        return [f"lag_stop.stiffness = {spring:g}: allowed is > 0 and up to {most:.6g}, {text}"]
+    most = 2.0 * math.sqrt(spring * inertia)
+    if damping > most * (1 + 1e-9):
+        return [f"lag_stop.damping = {damping:g}: allowed is up to {most:.6g}, at which a stop does not swing"]
+    return []
+
+
+def _moved_by_lag(aircraft: "Aircraft", rotor: Rotor) -> float:
+    """Inertia that all blades together move about their lag hinges, with a drive that gives way [kg m^2]."""
+    e_l, e_f = rotor.hinge_offset - rotor.flap_hinge_offset, rotor.flap_hinge_offset
+    inertia, moment = rotor.lag_inertia, e_l * (rotor.blade_mass * e_f + rotor.first_moment)
+    for drive in aircraft.drives:
+        if rotor.name in drive.rotors:
+            driven = [one for one in aircraft.rotors if one.name in drive.rotors]
+            first = next((one for one in driven if one.name == drive.rotors[0]), rotor)
+            blades = sum(one.blades * (one.speed / first.speed) ** 2 for one in driven)
+            about_axis = rotor.blade_mass * e_l**2 + 2.0 * moment + inertia
+            inertia -= (inertia + moment) ** 2 / (about_axis + drive.inertia / blades)
+    return float(inertia)
 
 
 def _schedule_problems(entry: MixingSchedule) -> list[str]:

@@ -436,6 +436,9 @@ MASS_RULES = {
 }
 
 
+STATION_SYMBOLS = {"chord": "c", "quarter_chord": "x_c", "chordwise_cg": "x_m"}
+
+
 def _stations(key: str, more: str = "increasing; in place of root and tip") -> Any:
     """Field with the stations of a table along the blade."""
     return declared(
@@ -444,7 +447,7 @@ def _stations(key: str, more: str = "increasing; in place of root and tip") -> A
         frozen,
         unit="1",
         key=f"{key}.stations",
-        symbol="c" if key == "chord" else "",
+        symbol=STATION_SYMBOLS.get(key, ""),
         default=None,
         is_physics=key not in DERIVED_FROM,
     )
@@ -535,6 +538,14 @@ class Rotor(ByContent):
         ("each", "teetering"),
         default="each",
     )
+    undersling: float = number(
+        "Height of a teetering hinge over the point where the pitch axes of the blades meet",
+        -5,
+        5,
+        "m",
+        symbol="h_u",
+        default=0.0,
+    )
     flap_spring: float = number(
         "Stiffness of the flap hinge", 0, 1e9, "N m/rad", symbol=r"K_\beta", model_field="flap_spring"
     )
@@ -586,6 +597,35 @@ class Rotor(ByContent):
     damper_c: float = _linkage("c", "Linkage: its end on the hub, inboard of the hinges")
     damper_d: float = _linkage("d", "Linkage: its end on the blade, ahead of the hinges against lag")
     damper_r: float = _linkage("r", "Linkage: lever of the end on the hub, which turns with the pitch")
+    lag_stops: Range | None = interval(
+        "Lag angles between which no stop touches the blade, leading is negative; without it there are no stops",
+        -85,
+        85,
+        "deg",
+        key="lag_stop.range_deg",
+        symbol=r"\xi_1, \xi_2",
+        default=None,
+    )
+    lag_stop_spring: float = number(
+        "Stiffness of the lag stops",
+        0,
+        1e9,
+        "N m/rad",
+        key="lag_stop.stiffness",
+        symbol="K_s",
+        model_field="lag_stop_spring",
+        default=0.0,
+    )
+    lag_stop_damping: float = number(
+        "Damping of the lag stops",
+        0,
+        1e9,
+        "N m s/rad",
+        key="lag_stop.damping",
+        symbol="C_s",
+        model_field="lag_stop_damping",
+        default=0.0,
+    )
     pitch_flap_coupling: float = number(
         "Blade pitch taken off per flap angle",
         -10,
@@ -609,6 +649,39 @@ class Rotor(ByContent):
     twist_tip: float | None = number("Twist at the tip", -90, 90, "deg", key="twist_deg.tip", default=None)
     twist_stations: Array | None = _stations("twist_deg")
     twist_values: Array | None = _station_values("Twist", -90, 90, "deg", key="twist_deg.values")
+    quarter_root: float | None = number(
+        "Offset of the quarter chord at the flap hinge, ahead of the pitch axis, linear to the tip; 0 if left out",
+        -10,
+        10,
+        "m",
+        key="quarter_chord.root",
+        symbol="x_c",
+        default=None,
+    )
+    quarter_tip: float | None = number(
+        "Offset of the quarter chord at the tip", -10, 10, "m", key="quarter_chord.tip", symbol="x_c", default=None
+    )
+    quarter_stations: Array | None = _stations("quarter_chord")
+    quarter_values: Array | None = _station_values(
+        "Offset of the quarter chord", -10, 10, "m", key="quarter_chord.values", symbol="x_c"
+    )
+    centre_root: float | None = number(
+        "Offset of the sections' centres of gravity at the flap hinge, ahead of the pitch axis, linear to the tip; 0"
+        " if left out",
+        -10,
+        10,
+        "m",
+        key="chordwise_cg.root",
+        symbol="x_m",
+        default=None,
+    )
+    centre_tip: float | None = number(
+        "Offset of the centre of gravity at the tip", -10, 10, "m", key="chordwise_cg.tip", symbol="x_m", default=None
+    )
+    centre_stations: Array | None = _stations("chordwise_cg")
+    centre_values: Array | None = _station_values(
+        "Offset of the sections' centres of gravity", -10, 10, "m", key="chordwise_cg.values", symbol="x_m"
+    )
     root_cutout: float = number(
         "Distance from the flap hinge to where the blade's profile begins", 0, 50, "m", symbol="r_c"
     )
@@ -726,6 +799,33 @@ class Rotor(ByContent):
         assert root is not None and tip is not None, "checked with the file"  # noqa: PT018
         return root + share * (tip - root)
 
+    def quarter_at(self, share: Any) -> Any:
+        """Offset of the quarter chord ahead of the pitch axis [m], as `chord_at`."""
+        ends = self.quarter_root or 0.0, self.quarter_tip or 0.0
+        return self._along(share, *ends, self.quarter_stations, self.quarter_values)
+
+    def centre_at(self, share: Any) -> Any:
+        """Offset of the sections' centres of gravity ahead of the pitch axis [m], as `chord_at`."""
+        ends = self.centre_root or 0.0, self.centre_tip or 0.0
+        return self._along(share, *ends, self.centre_stations, self.centre_values)
+
+    def sweep_at(self, share: Any) -> Any:
+        """Sweep of the quarter-chord line [rad], aft positive; of a table the slope of its line there."""
+        length = self.blade_length
+        if self.quarter_stations is None or self.quarter_values is None:
+            slope = ((self.quarter_tip or 0.0) - (self.quarter_root or 0.0)) / length
+            return np.full(np.shape(share), -math.atan(slope))
+        places = self.quarter_stations * self.radius
+        slopes = np.concatenate([[0.0], np.diff(self.quarter_values) / np.diff(places), [0.0]])
+        radius = self.hinge_offset + np.asarray(share) * length
+        return -np.arctan(slopes[np.searchsorted(places, radius, side="right")])
+
+    @property
+    def has_offsets(self) -> bool:
+        """Quarter chord or mass of its blades are not on a pitch axis through the flap hinge."""
+        given = (self.quarter_root, self.quarter_stations, self.centre_root, self.centre_stations)
+        return self.undersling != 0.0 or any(value is not None for value in given)
+
     @property
     def airfoil_names(self) -> tuple[str, ...]:
         """Airfoil tables from the root outwards, as the file names them."""
@@ -757,6 +857,12 @@ class Rotor(ByContent):
         if self.blade_inertia is not None:
             return self.blade_inertia
         return self.blade_mass * (self.blade_length * self.blade_length) / 3
+
+    @property
+    def lag_inertia(self) -> float:
+        """A2 of a blade about its lag hinge without flap [kg m^2]."""
+        e_f = self.flap_hinge_offset
+        return self.blade_mass * e_f**2 + 2.0 * e_f * self.first_moment + self.second_moment
 
     @property
     def is_teetering(self) -> bool:

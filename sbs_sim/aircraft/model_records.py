@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.aircraft.blade_offsets import blade_moments, inward_shift
 from sbs_sim.aircraft.commands import scheduled_controls
 from sbs_sim.aircraft.declaration import model_values
 from sbs_sim.aircraft.description import ENGINES, GROUND_EFFECTS, Body, Drive, Rotor
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 SECONDS_PER_HOUR = 3600.0
 NO_GROUND = 1e9  # m, depth of the ground where there is none
+NO_STOP = 1e6  # rad
 MIN_DENSITY = 1e-12  # kg/m^3, less than at 300 km: below it is vacuum
 
 
@@ -170,6 +172,8 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["lead_lag"] = switches["cyclic_inflow"] = 1
     switches["complete_coupling"] = aircraft.options.coupling == "complete"
     switches["axial_dampers"] = any(rotor.damper_damping > 0.0 for rotor in aircraft.rotors)
+    switches["lag_stops"] = any(rotor.lag_stops is not None for rotor in aircraft.rotors)
+    switches["offsets"] = any(rotor.has_offsets for rotor in aircraft.rotors)
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
     switches["stand"] = aircraft.body.is_stand
     switches["scheduled"] = any(rotor.schedule for rotor in aircraft.rotors)
@@ -230,15 +234,13 @@ def _blade_values(aircraft: "Aircraft", rotor: Rotor, number: int, grid: Grid) -
         **model_values(rotor, R.BLADE),
         "lag_damping": factor * rotor.lag_damping,
         "damper_damping": factor * rotor.damper_damping,
+        **_lag_stops(rotor),
         "rotor_speed": _kept_speed(aircraft, rotor),
         "inflow_speed": rotor.induced_power_factor * rotor.speed,
         "duct_turning": _turning(rotor),
         "axes": hub_axes(rotor.shaft_direction),
         "lag_hinge_offset": rotor.hinge_offset - rotor.flap_hinge_offset,
-        "first_moment": rotor.first_moment,
-        "second_moment": inertia,
-        "hub_second_moment": rotor.second_moment,
-        "inverse_second_moment": 1.0 / inertia,
+        **_offset_values(rotor, inertia),
         "cos_phase": cos_phase,
         "sin_phase": sin_phase,
         "cos_azimuth_offset": cos_azimuth_offset,
@@ -251,6 +253,28 @@ def _blade_values(aircraft: "Aircraft", rotor: Rotor, number: int, grid: Grid) -
         "min_number": grid.range[0],
         "max_number": grid.range[1],
     }
+
+
+def _offset_values(rotor: Rotor, inertia: float) -> dict[str, float]:
+    """Moments of a blade's mass; those across the span are of blades with offsets."""
+    values = {
+        "first_moment": rotor.first_moment,
+        "second_moment": inertia,
+        "hub_second_moment": rotor.second_moment,
+        "inverse_second_moment": 1.0 / inertia,
+    }
+    if not rotor.has_offsets:
+        return values
+    moments = blade_moments(rotor)._asdict()
+    first, second, height = (moments.pop(name) for name in ("first", "second", "height"))
+    values |= {"first_moment": first, "second_moment": second, "hub_second_moment": second}
+    return values | {"inverse_second_moment": 1.0 / second, "axis_height": height} | moments
+
+
+def _lag_stops(rotor: Rotor) -> dict[str, float]:
+    """Where the stops of a blade are, and what they are made of; without them it never comes there."""
+    first, last = rotor.lag_stops or (-NO_STOP, NO_STOP)
+    return {"lag_stop_first": first, "lag_stop_last": last}
 
 
 def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
@@ -393,7 +417,22 @@ def _elements(aircraft: "Aircraft", first_rows: list[list[int]]) -> NDArray[Any]
         elements["number_scale"][j] = number_scale(aircraft, j, elements["chord"][j])
         airfoil = rotor.airfoil_at(elements["span"][j])
         elements["airfoil"][j], elements["first_row"][j] = airfoil, np.array(first_rows[j])[airfoil]
+        elements["cos_sweep"][j] = 1.0
+        if rotor.has_offsets:
+            _set_offsets(aircraft, j, elements[j])
     return elements
+
+
+def _set_offsets(aircraft: "Aircraft", rotor: int, elements: NDArray[Any]) -> None:
+    """Set where the quarter chord of elements is, and its sweep; Reynolds numbers are those of the chord across it."""
+    own, span = aircraft.rotors[rotor], elements["span"][..., 0].copy()
+    share = span / own.blade_length
+    offset, sweep, twist = own.quarter_at(share), own.sweep_at(share), own.twist_at(share)
+    elements["offset_along"][..., 0], elements["offset_up"][..., 0] = offset * np.cos(twist), offset * np.sin(twist)
+    elements["cos_sweep"][..., 0], elements["sin_sweep"][..., 0] = np.cos(sweep), np.sin(sweep)
+    if aircraft.number_axis(rotor) != "mach":
+        elements["number_scale"] *= elements["cos_sweep"]
+    elements["span"][..., 0] = span + inward_shift(own)
 
 
 def number_scale(aircraft: "Aircraft", rotor: int, chord: Any) -> Any:

@@ -161,12 +161,12 @@ def _in_flight(engine: Engine, x: Array, swashplate: Array, psi: Array) -> Array
 
 def _fastest(rotor: Rotor) -> float:
     """Frequency or decay of the fastest motion of a blade, about [rad/s]."""
-    second, e_f = rotor.second_moment, rotor.flap_hinge_offset
-    lag_inertia = rotor.blade_mass * e_f**2 + 2.0 * e_f * rotor.first_moment + second
+    second, lag_inertia = rotor.second_moment, rotor.lag_inertia
     offset = 1.0 + rotor.hinge_offset * rotor.first_moment / second
     flap = math.sqrt(rotor.speed**2 * offset + rotor.flap_spring / second)
-    lag = math.sqrt(rotor.speed**2 * offset + rotor.lag_spring / lag_inertia)
-    return max(flap, lag, rotor.lag_damping * float(rotor.lag_damping_factors.max()) / lag_inertia)
+    lag = math.sqrt(rotor.speed**2 * offset + (rotor.lag_spring + rotor.lag_stop_spring) / lag_inertia)
+    damping = rotor.lag_damping * float(rotor.lag_damping_factors.max()) + rotor.lag_stop_damping
+    return max(flap, lag, damping / lag_inertia)
 
 
 def _rotor_states(aircraft: Aircraft, fidelity: Fidelity) -> tuple[IntArray, Array]:

@@ -54,7 +54,8 @@ def _lighter(rotor: Rotor) -> Rotor:
     """Substitute of a rotor with two blades; of unequal dampers it has the mean."""
     values: dict[str, Any] = {item.name: getattr(rotor, item.name) for item in fields(Rotor)}
     damping = SHARE * float(rotor.lag_damping_factors.mean())
-    values |= {name: SHARE * values[name] for name in ("blade_mass", "flap_spring", "lag_spring")}
+    shared = ("blade_mass", "flap_spring", "lag_spring", "lag_stop_spring", "lag_stop_damping")
+    values |= {name: SHARE * values[name] for name in shared}
     values |= {name: damping * values[name] for name in ("lag_damping", "damper_damping")}
     if rotor.blade_inertia is not None:
         values["blade_inertia"] = SHARE * rotor.blade_inertia

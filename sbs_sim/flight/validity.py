@@ -25,6 +25,12 @@ MAX_REVERSED = 0.1  # of the disc; reached at an advance ratio of 0.63, where th
 MAX_TIP_MACH = 0.44
 INCOMPRESSIBLE = "where incompressible section data do not hold"
 MAX_OUTSIDE = 0.1  # of the disc, with Reynolds or Mach numbers that the airfoil's table does not have
+# Of the chord: farther off the pitch axis, the lift or the mass of sections has a moment about it that twists a real
+# blade by a degree or more, and here it meets a rigid one. A c.g. behind the quarter chord lets elastic pitch and flap
+# diverge or flutter together; W. Johnson: Helicopter theory, on pitch-flap flutter.
+MAX_OFFSET = 0.1
+MAX_TAIL_HEAVY = 0.01
+OFFSET_POINTS = 101  # along the blade
 # Momentum theory in descent, in hover inflow velocities: the vortex ring state begins and ends where the motion of a
 # helicopter in it becomes unstable, W. Johnson: Model for vortex ring state influence on rotorcraft flight dynamics,
 # NASA/TP-2005-213477; up to twice the hover inflow there is no stream tube, J. G. Leishman: Principles of helicopter
@@ -146,6 +152,7 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
     """
     found = []
     for j, (rotor, row) in enumerate(zip(aircraft.rotors, rows, strict=True)):
+        found += blade_warnings(rotor)
         state = working_state(row)
         if state.inflow_state in (VORTEX_RING, TURBULENT_WAKE):
             found.append(f"{rotor.name}: {state.inflow_state} state, where momentum theory does not hold")
@@ -162,6 +169,20 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
         if state.outside_share > MAX_OUTSIDE:
             known = f"{NUMBER_NAMES[aircraft.number_axis(j)]} outside {_known_numbers(aircraft, j)},"
             found.append(f"{rotor.name}: {known} on more than {MAX_OUTSIDE:.0%} of the disc")
+    return found
+
+
+def blade_warnings(rotor: Rotor) -> list[str]:
+    """Offsets of blades with which they would not stay as rigid as they are here (theory.md section 3.6)."""
+    if not rotor.has_offsets:
+        return []
+    share = np.linspace(rotor.root_cutout / rotor.blade_length, 1.0, OFFSET_POINTS)
+    chord, quarter, centre = rotor.chord_at(share), rotor.quarter_at(share), rotor.centre_at(share)
+    found = []
+    if float((np.maximum(np.abs(quarter), np.abs(centre)) / chord).max()) > MAX_OFFSET:
+        found.append(f"{rotor.name}: sections more than {MAX_OFFSET:g} chords off the pitch axis, without torsion")
+    if float(np.mean(share * (quarter - centre) / chord) / np.mean(share)) > MAX_TAIL_HEAVY:
+        found.append(f"{rotor.name}: blades heavy behind the quarter chord, without flutter of elastic pitch")
     return found
 
 
@@ -203,4 +224,4 @@ def _is_quiet(aircraft: Aircraft, working: Array) -> NDArray[np.bool_]:
         # no vortex ring before its slowest descent, and nothing beyond it
         & (working[..., W.DESCENT] < RING_DESCENT[0] * (1.0 - MARGIN) * working[..., W.HOVER_INFLOW])
     )
-    return np.asarray(quiet.all(axis=1))
+    return np.asarray(quiet.all(axis=1) & (not any(blade_warnings(rotor) for rotor in aircraft.rotors)))

@@ -8,7 +8,7 @@ of a counter-clockwise rotor, and mirrored aircraft are mirrored exactly.
 
 from typing import Any, NamedTuple
 
-from sbs_sim.lanes import ZERO, Vector, cross, dot, rounded
+from sbs_sim.lanes import ZERO, Vector, cross, dot, maximum, rounded, select
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.section import SectionFlow
 from sbs_sim.model.trigonometry import TINY, cosine_sine, inverse_root
@@ -239,6 +239,22 @@ def with_axial_damper(blade, basis, pose, moments, pitch, pitch_rate):
     by_pitch = rounded((y * down - z * back) * inverse_length)
     force = rounded(blade.damper_damping * (by_flap * pose.beta_rate + by_lag * pose.xi_rate + by_pitch * pitch_rate))
     return HingeMoments(moments.flap - by_flap * force, moments.lag - by_lag * force, moments.inverse_lag_inertia)
+
+
+@kernel
+def with_lag_stops(blade, pose, moments):
+    """Hinge moments with those of the lag stops, eq. (3.13): they push, and never pull.
+
+    Parameters
+    ----------
+    moments : HingeMoments
+    """
+    spring, damping = blade.lag_stop_spring, blade.lag_stop_damping
+    behind, ahead = pose.xi - blade.lag_stop_last, blade.lag_stop_first - pose.xi
+    force_behind = maximum(spring * behind + damping * pose.xi_rate, 0.0)
+    force_ahead = maximum(spring * ahead - damping * pose.xi_rate, 0.0)
+    stops = select(ahead > 0.0, force_ahead, 0.0) - select(behind > 0.0, force_behind, 0.0)
+    return HingeMoments(moments.flap, moments.lag + stops, moments.inverse_lag_inertia)
 
 
 @kernel

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from sbs_sim.lanes import (
     Matrix,
     Vector,
+    add_to_quads,
     as_lanes,
     as_records,
     cross,
@@ -43,7 +44,8 @@ from sbs_sim.model.dynamics import (
 )
 from sbs_sim.model.frames import shaft_down
 from sbs_sim.model.kernel import entry, kernel
-from sbs_sim.model.teeter import hold_coning, lock_coning
+from sbs_sim.model.offset import inverse_flap_inertia
+from sbs_sim.model.teeter import coning_acceleration, hold_coning, inverse_sum, lock_coning
 
 NONE, ENGINE, ELECTRIC = range(3)  # kinds of engines
 SPEEDS, AZIMUTHS, ACCELERATIONS = range(3)  # of `Work.turning`
@@ -93,6 +95,8 @@ def driven_derivative(model, x, swash, psi, wind, work, dx, with_loads):
     loads = transmission_loads(memory.state, drives, flight, loads)
     if aircraft.switches[0].teetering == 1:
         lock_coning(aircraft, memory)
+    if aircraft.switches[0].offsets == 1:
+        sum_pitching(aircraft, memory)
     for i in range(drives.shape[0]):
         set_drive_rates(memory.state, drives[i], shafts[i], commands, out)
         eliminate(aircraft, memory, drives, i, shafts[i])
@@ -231,6 +235,13 @@ def eliminate(aircraft, memory, drives, number, shaft):
             squared = rounded(rotor.gear * rotor.gear)
             inertia = inertia + squared * power(turn, column)
             torque = torque + rotor.gear * power(turn, ForceMoment(total.force, total.moment))
+            if aircraft.switches[0].offsets == 1:
+                pitching = pitching_of(memory, rotor)
+                column = ForceMoment(pitching.force, pitching.moment)
+                force = force + scaled(column.force, rotor.gear)
+                moment = moment + scaled(column.moment, rotor.gear)
+                inertia = inertia + squared * (2.0 * power(turn, column) + pitching.inertia)
+                torque = torque + rotor.gear * pitching.torque
     inverse = rounded(1.0 / inertia)
     shaft.force, shaft.moment, shaft.inverse_inertia, shaft.torque = force, moment, inverse, torque
     scaled_force, scaled_moment = scaled(force, inverse), scaled(moment, inverse)
@@ -248,6 +259,66 @@ def eliminate(aircraft, memory, drives, number, shaft):
     )
     every.force = every.force - scaled(scaled_force, torque)
     every.moment = every.moment - scaled(scaled_moment, torque)
+
+
+class Pitching(NamedTuple):
+    """What a turn of the shaft does by the pitch of the blades of a rotor, eq. (7.17): columns, inertia, torque."""
+
+    force: Any
+    moment: Any
+    inertia: Any
+    torque: Any
+
+
+@kernel
+def sum_pitching(aircraft, memory):
+    """Set the sums over quads of what a turn of the shaft does by the pitch of the blades, eq. (7.17)."""
+    for r in range(aircraft.blades.shape[0]):
+        blade, terms, own = aircraft.blades[r], memory.terms[r], memory.pitching[r]
+        slope = own.slope
+        flap, lag = rounded(slope * own.flap_coupling), rounded(slope * own.lag_coupling)
+        by_flap, by_lag = rounded(flap * own.inverse_flap_inertia), rounded(lag * terms.inverse_lag_inertia)
+        locked_force, locked_moment = own.column_force * slope, own.column_moment * slope
+        locked_inertia = rounded(rounded(slope * slope) * own.inertia)
+        add_to_quads(
+            memory.pitch_sums,
+            blade.quad,
+            blade.starts_quad,
+            "force",
+            (
+                locked_force - terms.flap_column_force * by_flap - terms.lag_column_force * by_lag,
+                locked_moment - terms.flap_column_moment * by_flap - terms.lag_column_moment * by_lag,
+                locked_inertia - by_flap * flap - by_lag * lag,
+                slope * own.moment - by_flap * terms.flap_moment - by_lag * terms.lag_moment,
+                by_flap,
+                locked_force,
+                locked_moment,
+                locked_inertia,
+            ),
+        )
+
+
+@kernel
+def pitching_of(memory, rotor):
+    """Sums over a rotor, the coning of a teetering one locked."""
+    zero = rounded(0.0 * rotor.gear)
+    force, moment, free, torque = Vector(zero, zero, zero), Vector(zero, zero, zero), zero, zero
+    for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
+        own = memory.pitch_sums[quad]
+        force, moment = force + own.force, moment + own.moment
+        free, torque = free + own.inertia, torque + own.torque
+    if rotor.teetering == 1:
+        coning, flap = zero, zero
+        force_share, moment_share = Vector(zero, zero, zero), Vector(zero, zero, zero)
+        for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
+            locked = memory.coning[quad]
+            coning, flap = coning + memory.pitch_sums[quad].coning, flap + locked.flap
+            force_share, moment_share = force_share + locked.force_share, moment_share + locked.moment_share
+        factor = rounded(coning / inverse_sum(memory, rotor))
+        force, moment = force + scaled(force_share, factor), moment + scaled(moment_share, factor)
+        free = free + factor * coning
+        torque = torque + factor * (flap - rotor.blades * coning_acceleration(rotor, memory.state))
+    return Pitching(force, moment, free, torque)
 
 
 @kernel
@@ -288,7 +359,13 @@ def turn_blades(aircraft, memory, turning):
         acceleration = spread(turning[ACCELERATIONS], aircraft.indices.azimuth, blade.quad, blade)
         flap = power(turn, ForceMoment(terms.flap_column_force, terms.flap_column_moment))
         lag = power(turn, ForceMoment(terms.lag_column_force, terms.lag_column_moment))
-        flap_share, lag_share = rounded(flap * blade.inverse_second_moment), rounded(lag * terms.inverse_lag_inertia)
+        if aircraft.switches[0].offsets == 1:
+            own = memory.pitching[r]
+            flap, lag = flap + own.slope * own.flap_coupling, lag + own.slope * own.lag_coupling
+        flap_share, lag_share = (
+            rounded(flap * inverse_flap_inertia(aircraft, memory, r)),
+            rounded(lag * terms.inverse_lag_inertia),
+        )
         terms.flap_acceleration = terms.flap_acceleration - flap_share * acceleration
         terms.lag_acceleration = terms.lag_acceleration - lag_share * acceleration
 
@@ -299,10 +376,25 @@ def add_shaft_loads(aircraft, memory, turning):
     for j in range(aircraft.rotors.shape[0]):
         rotor, loads, acceleration = aircraft.rotors[j], memory.loads[j], turning[ACCELERATIONS, j]
         locked = locked_loads(memory.totals[j], turn_of(rotor))
+        if aircraft.switches[0].offsets == 1:
+            locked = add_pitching(memory, rotor, loads, locked, acceleration)
         moment = scaled(locked.moment - cross(rotor.hub, locked.force), acceleration)
         loads.force = loads.force - scaled(locked.force, acceleration)
         loads.moment = loads.moment - moment
         loads.torque = loads.torque - rotor.sense * dot(shaft_down(rotor.axes), moment)
+
+
+@kernel
+def add_pitching(memory, rotor, loads, locked, acceleration):
+    """Locked loads with those of the pitch that a turn of the shaft gives; its part of the torque is added."""
+    inertia = rounded(0.0 * acceleration)
+    force, moment = Vector(inertia, inertia, inertia), Vector(inertia, inertia, inertia)
+    for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
+        own = memory.pitch_sums[quad]
+        force, moment = force + own.locked_force, moment + own.locked_moment
+        inertia = inertia + own.locked_inertia
+    loads.torque = loads.torque + acceleration * (power(turn_of(rotor), ForceMoment(force, moment)) + inertia)
+    return ForceMoment(locked.force + force, locked.moment + moment)
 
 
 @kernel

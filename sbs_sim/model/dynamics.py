@@ -34,6 +34,7 @@ from sbs_sim.lanes import (
 from sbs_sim.model import state as S
 from sbs_sim.model.blade import (
     ForceMoment,
+    HingeMoments,
     Pose,
     about_cg,
     blade_accelerations,
@@ -47,6 +48,7 @@ from sbs_sim.model.blade import (
     section_flow,
     to_blade,
     with_axial_damper,
+    with_lag_stops,
 )
 from sbs_sim.model.contact import contact_load, set_contact_rates
 from sbs_sim.model.duct import duct_flow, duct_thrust, sheltered
@@ -56,6 +58,15 @@ from sbs_sim.model.ground_effect import add_ground_wash
 from sbs_sim.model.inflow import INVERSE_MASS, Inflow, disc_flow, inflow_rates
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
+from sbs_sim.model.offset import (
+    PitchMotion,
+    blade_equations,
+    inverse_flap_inertia,
+    inverse_where,
+    locked_offset_inertia,
+    offset_air_loads,
+    offset_flow,
+)
 from sbs_sim.model.records import OTHERS, WASH_ROWS
 from sbs_sim.model.section import section_loads
 from sbs_sim.model.surfaces import fuselage_load, ramp, rotor_wash, surface_load
@@ -104,6 +115,8 @@ class Memory(NamedTuple):
     coning_change: Any
     wash: Any
     commands: Any
+    pitching: Any
+    pitch_sums: Any
 
 
 class Flight(NamedTuple):
@@ -210,6 +223,8 @@ def memory_in_lanes(work):
         coning_change=as_lanes(work.coning_change, sums),
         wash=as_lanes(work.wash, sums),
         commands=as_lanes(work.commands, sums),
+        pitching=as_records(work.pitching),
+        pitch_sums=as_records(work.pitch_sums),
     )
 
 
@@ -329,7 +344,17 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
             air_velocity = sheltered(blade.duct_turning, air_velocity)
         flow = section_flow(blade, basis, motion, air_velocity, induced, gradient)
         pitch = blade_pitch(aircraft, blade, pose, swash)
+        terms.u_t_hinge, terms.u_t_slope = flow.u_t_hinge, flow.u_t_slope
+        terms.u_p_hinge, terms.u_p_slope = flow.u_p_hinge, flow.u_p_slope
+        terms.pitch = pitch
         elements = aircraft.elements[blade.elements]
+        if aircraft.switches[0].offsets == 1:
+            turning = pitch_motion(aircraft, blade, pose, swash)
+            turned = offset_flow(blade, basis, motion, turning.rate, air_velocity, induced, gradient)
+            met = offset_air_loads(air, blade, basis, elements, aircraft.knots[r], aircraft.table, turned, pitch)
+            at_hub = to_blade(blade, basis, hub.centripetal)
+            set_offset_equations(aircraft, memory, r, pose, basis, motion, met, at_hub, pitch, turning)
+            continue
         loads = section_loads(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, pitch)
         # known acceleration of the hub in a_0, for the hinges (theory.md section 3.1) and for the hub loads (5.1)
         if aircraft.switches[0].complete_coupling == 1:
@@ -338,9 +363,6 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
             gravity = transposed(blade.axes) @ flight.gravity
             at_hinges, at_hub = -to_blade(blade, basis, gravity), Vector(0.0, 0.0, 0.0)
         set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub, swash, pitch)
-        terms.u_t_hinge, terms.u_t_slope = flow.u_t_hinge, flow.u_t_slope
-        terms.u_p_hinge, terms.u_p_slope = flow.u_p_hinge, flow.u_p_slope
-        terms.pitch = pitch
 
 
 @kernel
@@ -421,6 +443,63 @@ def pitch_rate(aircraft, blade, pose, swash):
 
 
 @kernel
+def pitch_motion(aircraft, blade, pose, swash):
+    """Pitch over the azimuth and over time, eq. (4.8) differentiated, with swashplates that do not move."""
+    angles, quad = aircraft.indices.swash, blade.quad
+    cosine, sine = swashplate_azimuth(blade, pose)
+    lateral = blade.sense * spread(swash, angles[S.LATERAL], quad, blade)
+    longitudinal = spread(swash, angles[S.LONGITUDINAL], quad, blade)
+    slope, curvature = lateral * sine - longitudinal * cosine, lateral * cosine + longitudinal * sine
+    speed = blade.rotor_speed
+    rate = speed * slope - blade.pitch_flap_coupling * pose.beta_rate - blade.pitch_lag_coupling * pose.xi_rate
+    return PitchMotion(slope, curvature, rate, (speed * speed) * curvature)
+
+
+@kernel
+def set_offset_equations(aircraft, memory, r, pose, basis, motion, air_loads, at_hub, pitch, turning):
+    """Set what a register r of blades with offsets has in the equations (5.6), and add it to the sums.
+
+    The inertia that flap and lag have in common is taken out of flap: its column, moment and inertia are those that are
+    left once lag is eliminated, eq. (3.17).
+    """
+    blade, terms, own = aircraft.blades[r], memory.terms[r], memory.pitching[r]
+    found = blade_equations(blade, basis, motion, pitch, turning, air_loads.load, at_hub)
+    moments = HingeMoments(
+        found.moments[0] - blade.flap_spring * (pose.beta - blade.flap_rest),
+        found.moments[1] - blade.lag_spring * (pose.xi - blade.lag_rest) - blade.lag_damping * pose.xi_rate,
+        inverse_where(blade.lead_lag, found.lag_inertia),
+    )
+    if aircraft.switches[0].axial_dampers == 1:
+        moments = with_axial_damper(blade, basis, pose, moments, pitch, turning.rate)
+    if aircraft.switches[0].lag_stops == 1:
+        moments = with_lag_stops(blade, pose, moments)
+    inverse_lag_inertia = moments.inverse_lag_inertia
+    share = rounded(found.flap_lag * inverse_lag_inertia)
+    flap, lag = about_cg(blade, basis, found.flap), about_cg(blade, basis, found.lag)
+    flap = ForceMoment(flap.force - scaled(lag.force, share), flap.moment - scaled(lag.moment, share))
+    moments = HingeMoments(moments.flap - share * moments.lag, moments.lag, inverse_lag_inertia)
+    inverse_flap_inertia = inverse_where(blade.mass, found.flap_inertia - share * found.flap_lag)
+    known, column = about_cg(blade, basis, found.known), about_cg(blade, basis, found.pitch)
+    terms.cosine, terms.sine = pose.cosine, pose.sine
+    terms.flap_column_force, terms.flap_column_moment = flap.force, flap.moment
+    terms.lag_column_force, terms.lag_column_moment = lag.force, lag.moment
+    terms.flap_moment, terms.lag_moment = moments.flap, moments.lag
+    terms.inverse_lag_inertia = inverse_lag_inertia
+    terms.known_force, terms.known_moment = known.force, known.moment
+    own.slope, own.column_force, own.column_moment = turning.slope, column.force, column.moment
+    own.moment, own.inertia = found.moments[2], found.pitch_inertia
+    own.flap_coupling, own.lag_coupling = found.flap_pitch - share * found.lag_pitch, found.lag_pitch
+    own.lag_share, own.inverse_flap_inertia = share, inverse_flap_inertia
+    thrust = rounded(air_loads.load.force.z)
+    root_moment = blade.hinge_offset * air_loads.normal_force + air_loads.normal_moment
+    inertia = locked_offset_inertia(blade, basis, pitch)
+    add_to_sums(
+        memory, blade, pose, thrust, root_moment, inertia, moments, flap, lag, known, inverse_flap_inertia,
+        inverse_lag_inertia,
+    )  # fmt: skip
+
+
+@kernel
 def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub, swash, pitch):
     """Set what a register r of blades has in the equations (5.6), and add it to the sums.
 
@@ -432,6 +511,8 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
     moments = hinge_moments(blade, basis, pose, loads, own.hinge + at_hinges, own.slope)
     if aircraft.switches[0].axial_dampers == 1:
         moments = with_axial_damper(blade, basis, pose, moments, pitch, pitch_rate(aircraft, blade, pose, swash))
+    if aircraft.switches[0].lag_stops == 1:
+        moments = with_lag_stops(blade, pose, moments)
     flap, lag = hinge_columns(blade, basis)
     flap, lag = about_cg(blade, basis, flap), about_cg(blade, basis, lag)
     known = about_cg(blade, basis, known_loads(blade, basis, loads, own.hinge + at_hub, own.slope))
@@ -444,19 +525,24 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
     terms.known_force, terms.known_moment = known.force, known.moment
     if aircraft.switches[0].complete_hub_moment == 0:
         terms.paper_moment, terms.flap_axis = paper_moment(blade, basis, pose, loads)
-    add_to_sums(memory, blade, pose, basis, loads, moments, flap, lag, known, inverse_lag_inertia)
+    thrust = basis.cos_flap * loads.normal_force
+    root_moment = blade.hinge_offset * loads.normal_force + loads.normal_moment  # Int (e_0 + s) dF_n
+    inertia, inverse = locked_inertia(blade, basis), blade.inverse_second_moment
+    add_to_sums(
+        memory, blade, pose, thrust, root_moment, inertia, moments, flap, lag, known, inverse, inverse_lag_inertia
+    )
 
 
 @kernel
-def add_to_sums(memory, blade, pose, basis, loads, moments, flap, lag, known, inverse_lag_inertia):
+def add_to_sums(memory, blade, pose, thrust, root_moment, inertia, moments, flap, lag, known, inverse_flap_inertia,
+                inverse_lag_inertia):  # fmt: skip
     """Add to the sums over quads what the equations of the body and of the inflow need, in the order of SUMS.
 
-    `flap` and `lag` are c_beta and c_xi about the c.g. The hinges are eliminated, eq. (5.8).
+    `flap` and `lag` are c_beta and c_xi about the c.g., `inertia` is that of `locked_inertia`. The hinges are
+    eliminated, eq. (5.8).
     """
-    thrust = basis.cos_flap * loads.normal_force
-    root_moment = blade.hinge_offset * loads.normal_force + loads.normal_moment  # Int (e_0 + s) dF_n
-    first_moment, second_moment = locked_inertia(blade, basis)
-    flap_acceleration = rounded(blade.inverse_second_moment * moments.flap)  # while the body does not accelerate
+    first_moment, second_moment = inertia
+    flap_acceleration = rounded(inverse_flap_inertia * moments.flap)  # while the body does not accelerate
     lag_acceleration = rounded(inverse_lag_inertia * moments.lag)
     force = known.force - flap.force * flap_acceleration - lag.force * lag_acceleration
     moment = known.moment - flap.moment * flap_acceleration - lag.moment * lag_acceleration
@@ -468,7 +554,7 @@ def add_to_sums(memory, blade, pose, basis, loads, moments, flap, lag, known, in
         (thrust, root_moment * pose.sine, root_moment * pose.cosine, blade.mass, first_moment)
         + second_moment
         + (force, moment)
-        + hinge_inertia(flap, lag, blade.inverse_second_moment, inverse_lag_inertia),
+        + hinge_inertia(flap, lag, inverse_flap_inertia, inverse_lag_inertia),
     )
 
 
@@ -778,7 +864,7 @@ def solve_blades(aircraft, memory):
     """Set flap and lag accelerations of every blade from those of the body, eq. (5.9)."""
     body = memory.acceleration[0]
     for r in range(aircraft.blades.shape[0]):
-        blade, terms = aircraft.blades[r], memory.terms[r]
+        terms = memory.terms[r]
         flap = (
             terms.flap_moment
             - dot(terms.flap_column_force, body.specific_force)
@@ -789,7 +875,7 @@ def solve_blades(aircraft, memory):
             - dot(terms.lag_column_force, body.specific_force)
             - dot(terms.lag_column_moment, body.angular)
         )
-        terms.flap_acceleration = flap * blade.inverse_second_moment
+        terms.flap_acceleration = flap * inverse_flap_inertia(aircraft, memory, r)
         terms.lag_acceleration = lag * terms.inverse_lag_inertia
 
 
@@ -824,6 +910,9 @@ def set_hub_loads(aircraft, memory):
             axial = dot(down, moment)
         loads.thrust, loads.torque = total.thrust, rotor.sense * axial
         loads.force, loads.moment = force, moment
+        if switches.offsets == 1:
+            for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
+                loads.torque = loads.torque - memory.hubs[quad].pitch_power
 
 
 @kernel
@@ -839,6 +928,23 @@ def sum_hub_loads(aircraft, memory):
             inertial = blade.lead_lag * blade.hub_second_moment * flap
             paper = terms.paper_moment - terms.flap_axis * inertial
             add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "paper_moment", (paper,))
+        if aircraft.switches[0].offsets == 1:
+            power = pitch_power(memory, r)
+            add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "pitch_power", (power,))
+
+
+@kernel
+def pitch_power(memory, r):
+    """Power of the moment about the pitch axis on the blades' pitch, over that of the shaft's turn, eq. (3.18)."""
+    terms, own, body = memory.terms[r], memory.pitching[r], memory.acceleration[0]
+    moment = (
+        own.moment
+        - own.flap_coupling * terms.flap_acceleration
+        - own.lag_coupling * terms.lag_acceleration
+        - dot(own.column_force, body.specific_force)
+        - dot(own.column_moment, body.angular)
+    )
+    return rounded(own.slope * moment)
 
 
 @kernel
@@ -889,6 +995,8 @@ def set_body_rates(memory, flight, dx):
 def set_rotor_rates(aircraft, memory, dx):
     """Set the rates of the multiblade coordinates (paper eqs. [13], [14]) and of the inflow."""
     x, lead_lag = memory.state, aircraft.switches[0].lead_lag
+    if aircraft.switches[0].offsets == 1:
+        add_lag_of_flap(aircraft, memory, -1.0)
     for r in range(aircraft.blades.shape[0]):
         add_accelerations(aircraft.blades[r], memory.terms[r], memory.means, memory.harmonics)
     for j in range(aircraft.rotors.shape[0]):
@@ -931,6 +1039,15 @@ def flow_of_duct(aircraft, memory, j):
 def met_with_wash(memory, j, mu):
     """Velocity of a hub relative to the air that the other rotors move, over the tip speed, hub axes."""
     return Vector(mu.x, mu.y, mu.z - memory.wash[OTHERS, j])
+
+
+@kernel
+def add_lag_of_flap(aircraft, memory, factor):
+    """Add `factor` times the share of lag in flap: -1 makes xi'' of what is left of it in eq. (3.17), 1 undoes that."""
+    for r in range(aircraft.blades.shape[0]):
+        terms, own = memory.terms[r], memory.pitching[r]
+        change = rounded(own.lag_share * terms.flap_acceleration)
+        terms.lag_acceleration = terms.lag_acceleration + factor * change
 
 
 @kernel

@@ -120,6 +120,8 @@ def _quads(model: Model) -> list[list[int | None]]:
 WEIGHTLESS = (
     *("mass", "first_moment", "hub_second_moment", "inverse_second_moment", "flap_spring", "lag_spring", "lag_damping"),
     "damper_damping",
+    *("chord_first", "normal_first", "chord_product", "normal_product"),
+    *("chord_second", "mixed_second", "normal_second"),
     *("lead_lag", "alternation"),
 )
 

@@ -42,6 +42,8 @@ SWITCHES = {
     "complete_coupling": INTEGER,
     "complete_hub_moment": INTEGER,
     "axial_dampers": INTEGER,  # 1 where a rotor has them
+    "lag_stops": INTEGER,
+    "offsets": INTEGER,  # 1 where quarter chord or mass of a blade are not on the pitch axis
     "stand": INTEGER,
     "scheduled": INTEGER,  # 1 where shares in swashplate angles change with the airspeed
     "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
@@ -129,6 +131,18 @@ BLADE = {
     "damper_c": LANES,
     "damper_d": LANES,
     "damper_r": LANES,
+    "lag_stop_first": LANES,  # angles beyond which the blade meets the stops [rad]
+    "lag_stop_last": LANES,
+    "lag_stop_spring": LANES,
+    "lag_stop_damping": LANES,
+    "axis_height": LANES,  # of the pitch axis along n over the flap hinge
+    "chord_first": LANES,  # moments of the mass at zero pitch: along the chord, and normal to it
+    "normal_first": LANES,
+    "chord_product": LANES,
+    "normal_product": LANES,
+    "chord_second": LANES,
+    "mixed_second": LANES,
+    "normal_second": LANES,
     "pitch_flap_coupling": LANES,
     "pitch_lag_coupling": LANES,
     "cos_phase": LANES,  # of the swashplate
@@ -190,6 +204,10 @@ ELEMENT = {
     "first_row": LANES,  # of the airfoil table
     "airfoil": LANES,  # number of the airfoil from the root outwards
     "number_scale": LANES,  # of the airfoil table over the airspeed: c / nu of Reynolds numbers, 1 / a of Mach numbers
+    "offset_along": LANES,  # of the quarter chord from the pitch axis at zero pitch, and normal to it
+    "offset_up": LANES,
+    "cos_sweep": LANES,
+    "sin_sweep": LANES,
 }
 # parts with tables in `shapes`: see `sbs_sim.model.surfaces`
 SURFACE = {
@@ -238,9 +256,10 @@ SUMS = {
 HARMONIC = {"flap_cosine": LANES, "flap_sine": LANES, "lag_cosine": LANES, "lag_sine": LANES}
 # of a teetering rotor: the sums of c_beta, of c_beta / A_1 and of Q_beta / A_1
 CONING = {"force": VECTOR, "moment": VECTOR, "force_share": VECTOR, "moment_share": VECTOR, "flap": LANES}
+CONING |= {"inverse": LANES}  # sum of 1 / A_1, of blades with offsets
 MEANS = {"flap": LANES, "lag": LANES, "flap_differential": LANES, "lag_differential": LANES}
 # loads on the hub without those of the locked blades, about the c.g., and the moment in the paper's reading
-HUB = {"force": VECTOR, "moment": VECTOR, "paper_moment": VECTOR}
+HUB = {"force": VECTOR, "moment": VECTOR, "paper_moment": VECTOR, "pitch_power": LANES}
 # terms of a blade that are kept until the body's accelerations are known
 TERMS = {
     "cosine": LANES,
@@ -263,6 +282,29 @@ TERMS = {
     "u_p_hinge": LANES,
     "u_p_slope": LANES,
     "pitch": LANES,
+}
+# of a blade with offsets, beside TERMS, see `sbs_sim.model.offset`; c_beta, Q_beta and A_1 are without what lag takes
+PITCHING = {
+    "slope": LANES,  # of the pitch over the azimuth
+    "column_force": VECTOR,  # of pitch
+    "column_moment": VECTOR,
+    "moment": LANES,  # about the pitch axis
+    "flap_coupling": LANES,  # inertia of flap with pitch, of lag with pitch, of pitch
+    "lag_coupling": LANES,
+    "inertia": LANES,
+    "lag_share": LANES,  # xi'' that a unit of beta'' takes
+    "inverse_flap_inertia": LANES,
+}
+# sums over the blades of a quad of what a turn of the shaft does by their pitch, see `sbs_sim.model.drive.add_pitching`
+PITCH_SUMS = {
+    "force": VECTOR,  # columns, the hinges eliminated
+    "moment": VECTOR,
+    "inertia": LANES,
+    "torque": LANES,
+    "coning": LANES,
+    "locked_force": VECTOR,  # with locked hinges
+    "locked_moment": VECTOR,
+    "locked_inertia": LANES,
 }
 STRIP = {"airspeed": LANES, "number": LANES, "fraction": LANES, "row": LANES}
 ACCELERATION = {"specific_force": VECTOR, "angular": VECTOR}  # a_g and om', body axes
@@ -415,6 +457,10 @@ class Work(NamedTuple):
         through its disc, over Omega R. Of an aircraft without such, empty.
     commands : ndarray, shape (3 n_rows, n)
         Swashplate angles at the present airspeed, where they change with it; else empty.
+    pitching : structured ndarray, shape (registers,)
+        Of blades with offsets, else empty.
+    pitch_sums : structured ndarray, shape (quads,)
+        Of such blades that a drive turns, else empty.
     """
 
     state: Array
@@ -439,6 +485,8 @@ class Work(NamedTuple):
     coning_change: Array
     wash: Array
     commands: Array
+    pitching: NDArray[Any]
+    pitch_sums: NDArray[Any]
 
 
 def state_size(model: Model) -> int:
@@ -457,7 +505,8 @@ def make_work(model: Model) -> Work:
     size = state_size(model)
     acceleration_rows = aligned((6, n), float)
     load_rows = aligned((LOAD_SIZE * len(rotors), n), float)
-    turning, teetering = len(model.drives) > 0, bool(model.switches["teetering"][0])
+    turning = len(model.drives) > 0
+    teetering, offsets = (bool(model.switches[name][0]) for name in ("teetering", "offsets"))
     return Work(
         state=aligned((size + 1, n), float),
         terms=records(TERMS, len(model.blades), width),
@@ -481,6 +530,8 @@ def make_work(model: Model) -> Work:
         coning_change=aligned((len(rotors) if teetering else 0, n), float),
         wash=aligned((WASH_ROWS, len(rotors) if model.switches["wash"][0] else 0, n), float),
         commands=aligned((_command_count(model), n), float),
+        pitching=records(PITCHING, len(model.blades) if offsets else 0, width),
+        pitch_sums=records(PITCH_SUMS, quads if offsets and turning else 0, n),
     )
 
 

@@ -2,6 +2,7 @@
 
 from sbs_sim.lanes import Vector, as_lanes, cross, rounded, spread, zeros_like
 from sbs_sim.model.dynamics import (
+    add_lag_of_flap,
     body_motion,
     in_lanes,
     memory_in_lanes,
@@ -56,6 +57,8 @@ def steady_balance(model, x, swash, psi, wind, work, dx, imbalance):
     set_body_rates(memory, flight, rates)
     set_rotor_rates(aircraft, memory, rates)
     hold_coordinates(aircraft, memory)
+    if aircraft.switches[0].offsets == 1:
+        add_lag_of_flap(aircraft, memory, 1.0)
     set_hub_loads(aircraft, memory)
     total, body = with_hub_loads(aircraft, memory, loads), aircraft.body[0]
     set_vector(left, 0, total.force - steady * body.mass)

@@ -6,6 +6,7 @@ blade, to make that mean what it has to be, is eliminated like a hinge of eq. (5
 
 from sbs_sim.lanes import Matrix, Vector, add_to_quads, rounded, select, spread
 from sbs_sim.model.kernel import kernel
+from sbs_sim.model.offset import inverse_flap_inertia
 
 
 @kernel
@@ -13,9 +14,10 @@ def lock_coning(aircraft, memory):
     """Take the coning of teetering rotors out of the sums over their blades, eq. (3.11)."""
     for r in range(aircraft.blades.shape[0]):
         blade, terms = aircraft.blades[r], memory.terms[r]
-        inverse, force, moment = blade.inverse_second_moment, terms.flap_column_force, terms.flap_column_moment
+        inverse = inverse_flap_inertia(aircraft, memory, r)
+        force, moment = terms.flap_column_force, terms.flap_column_moment
         free = (times(force, inverse), times(moment, inverse), rounded(inverse * terms.flap_moment))
-        add_to_quads(memory.coning, blade.quad, blade.starts_quad, "force", (force, moment, *free))
+        add_to_quads(memory.coning, blade.quad, blade.starts_quad, "force", (force, moment, *free, inverse))
     for j in range(aircraft.rotors.shape[0]):
         rotor = aircraft.rotors[j]
         if rotor.teetering == 1:
@@ -26,10 +28,22 @@ def lock_coning(aircraft, memory):
                 force, moment, flap = force + own.force, moment + own.moment, flap + own.flap
                 force_share, moment_share = force_share + own.force_share, moment_share + own.moment_share
             share = rotor.inverse_blades
+            if aircraft.switches[0].offsets == 1:  # blades whose A_1 differ
+                factor = 1.0 / (share * inverse_sum(memory, rotor))
+                force, moment = times(force_share, factor), times(moment_share, factor)
             added = rounded(share * flap) - coning_acceleration(rotor, memory.state)
             force_share, moment_share = times(force_share, share), times(moment_share, share)
             take_out(memory.totals[j], force, moment, force_share, moment_share, added)
             take_out(memory.totals[aircraft.rotors.shape[0]], force, moment, force_share, moment_share, added)
+
+
+@kernel
+def inverse_sum(memory, rotor):
+    """Sum of 1 / A_1 over the blades of a rotor."""
+    found = 0.0
+    for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
+        found = found + memory.coning[quad].inverse
+    return found
 
 
 @kernel
@@ -60,6 +74,9 @@ def hold_coning(aircraft, memory):
     for r in range(aircraft.blades.shape[0]):
         blade, flap = aircraft.blades[r], memory.terms[r].flap_acceleration
         add_to_quads(memory.means, blade.quad, blade.starts_quad, "flap", (flap, flap, flap, flap))
+        if aircraft.switches[0].offsets == 1:
+            inverse = memory.pitching[r].inverse_flap_inertia
+            add_to_quads(memory.coning, blade.quad, blade.starts_quad, "inverse", (inverse,))
     for j in range(aircraft.rotors.shape[0]):
         rotor = aircraft.rotors[j]
         memory.coning_change[j] = 0.0 * rotor.inverse_blades
@@ -68,9 +85,13 @@ def hold_coning(aircraft, memory):
             for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
                 mean = mean + memory.means[quad].flap
             memory.coning_change[j] = coning_acceleration(rotor, memory.state) - rotor.inverse_blades * mean
+            if aircraft.switches[0].offsets == 1:
+                memory.coning_change[j] = memory.coning_change[j] / (rotor.inverse_blades * inverse_sum(memory, rotor))
     for r in range(aircraft.blades.shape[0]):
         blade, terms = aircraft.blades[r], memory.terms[r]
         change = spread(memory.coning_change, aircraft.indices.azimuth, blade.quad, blade)
+        if aircraft.switches[0].offsets == 1:
+            change = rounded(change * memory.pitching[r].inverse_flap_inertia)
         terms.flap_acceleration = terms.flap_acceleration + select(blade.mass > 0.0, change, 0.0)
 
 

@@ -379,6 +379,7 @@ def schema_leaves(schema, path=()):
 # in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py
 ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage", "flap_hinge", "schedule")
 ELSEWHERE += ("ground", "contact_points")
+ELSEWHERE += ("quarter_chord", "chordwise_cg", "undersling")
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)
@@ -415,6 +416,7 @@ OPTIONAL = {
     "lag_rest_deg",
     "blade_lag_damping",
     "lag_damper",
+    "lag_stop",
     "duct",
     "stations",
     "values",
@@ -491,6 +493,10 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
         assert path[:3] == ("rotors", 0, "mixing") or OPTIONAL & set(path), "a key that sbs.yaml does not show"
     if path[2:3] == ("lag_damper",):
         data["rotors"][0]["lag_damper"] = {"c": 0.02, "d": 0.03}
+    if path[2:3] == ("lag_stop",):
+        data["rotors"][0]["lag_stop"] = {"range_deg": [-11.0, 14.0], "stiffness": 30.0, "damping": 0.1}
+        aircraft, value = Aircraft.from_dict(data), get(data, path)
+        everything, arrays = flattened(aircraft), model_arrays(aircraft)
     if path[2:3] == ("duct",):
         data["rotors"][0]["duct"] = {"exit_area": 0.9}
         aircraft, value = Aircraft.from_dict(data), 0.9
@@ -706,6 +712,48 @@ REFUSED = {
         (*R0, "lag_damper"),
         {"damping": 5.0},
         "rotors[0].lag_damper.damping = 5.0: allowed is 0 where both ends of the damper are in one place",
+    ),
+    "quarter chord without a tip": ((*R0, "quarter_chord"), {"root": 0.01}, "rotors[0].quarter_chord.tip: missing key"),
+    "table of the c.g. with a value too many": (
+        (*R0, "chordwise_cg"),
+        {"stations": [0.2, 1.0], "values": [0.0, 0.01, 0.02]},
+        "rotors[0].chordwise_cg.values: allowed are 2 numbers, one of each station, not 3",
+    ),
+    "c.g. that no blade has": (
+        R0,
+        {
+            **sbs_data()["rotors"][0],
+            "blade_inertia": 0.0082,  # nearly all of it at the c.g.
+            "chordwise_cg": {"stations": [0.9, 1.0], "values": [0.0, 0.3]},
+        },
+        "rotors[0].chordwise_cg: no blade of this mass, c.g. and inertia has it; allowed with mass_distribution",
+    ),
+    "sweep of 80 degrees": (
+        (*R0, "quarter_chord"),
+        {"stations": [0.2, 0.9, 0.91, 1.0], "values": [0.0, 0.0, -0.03, -0.03]},
+        "rotors[0].quarter_chord: a sweep of 80.4 deg: allowed are up to 60",
+    ),
+    "undersling of a hinge of each blade": (
+        (*R0, "undersling"),
+        0.02,
+        "rotors[0].undersling = 0.02: allowed is 0 where flap_hinge is not teetering",
+    ),
+    "lag stops on one side": (
+        (*R0, "lag_stop"),
+        {"range_deg": [1.0, 9.0], "stiffness": 30.0},
+        "rotors[0].lag_stop.range_deg = [1.0, 9.0]: allowed are a negative and a positive end",
+    ),
+    "lag stops too stiff for the default step": (
+        (*R0, "lag_stop"),
+        {"range_deg": [-9.0, 9.0], "stiffness": 1e6},
+        "rotors[0].lag_stop.stiffness = 1e+06: allowed is > 0 and up to 23859.5, 6 per revolution on the inertia"
+        " that lag moves, 0.0104925 kg m^2",
+    ),
+    "lag stops without a range": ((*R0, "lag_stop"), {"stiffness": 9.0}, "rotors[0].lag_stop.range_deg: missing key"),
+    "lag stops that creep back": (
+        (*R0, "lag_stop"),
+        {"range_deg": [-9.0, 9.0], "stiffness": 1000.0, "damping": 10.0},
+        "rotors[0].lag_stop.damping = 10: allowed is up to 6.47843, at which a stop does not swing",
     ),
     "no rotors": (("rotors",), [], "rotors = []: allowed is a list of at least 1"),
     "sense of rotation": ((*R0, "rotation"), 2, "rotors[0].rotation = 2: allowed is one of 1, -1"),

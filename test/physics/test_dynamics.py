@@ -128,8 +128,21 @@ TEETERING = {
     "flap_hinge_offset": 0.0,
     "flap_hinge": "teetering",
 }
+SWEPT = {"quarter_chord": {"stations": [0.3, 0.8, 1.0], "values": [0.01, 0.012, -0.05]}}
+OFFSETS = SWEPT | {"chordwise_cg": {"root": 0.012, "tip": -0.03}}
 AIRCRAFT = {
     "sbs": {},
+    "offsets_and_lag_stops": {
+        "every_rotor": ODD_BLADE | OFFSETS | {"lag_stop": {"range_deg": [-3.0, 1.5], "stiffness": 900.0}},
+        "rotors": TILTED,
+    },
+    "offsets_of_one_rotor": {"rotors": [ODD_BLADE | OFFSETS | {"blades": 2}, {"blades": 4}]},
+    "offsets_and_mach_numbers": {
+        "environment": {"speed_of_sound": 150.0},
+        "every_rotor": SWEPT | {"airfoil": "sc1095r8"},
+        "body": {"stand": STANDS["mixed"]},
+    },
+    "underslung": {"every_rotor": TEETERING | {"undersling": 0.03}, "rotors": [TILTED[0] | OFFSETS, TILTED[1]]},
     "teetering": {"every_rotor": TEETERING, "rotors": TILTED},
     "one_teeters": {"every_rotor": ODD_BLADE, "rotors": [TEETERING, {"blades": 3}]},
     "teetering_on_a_stand": {"every_rotor": TEETERING, "rotors": TILTED, "body": {"stand": STANDS["mixed"]}},
@@ -156,6 +169,11 @@ AIRCRAFT = {
     "unequal_lag_dampers": {
         "every_rotor": ODD_BLADE | {"blades": 4},
         "rotors": [{"blade_lag_damping": [1.0, 0.0, 2.0, 0.5]}, {"lag_damper": {"damping": 0.0}}],
+    },
+    # about half of the blades of a random state are beyond a stop, some of them on their way back
+    "lag_stops": {
+        "every_rotor": ODD_BLADE,
+        "rotors": [{"lag_stop": {"range_deg": [-3.0, 1.5], "stiffness": 900.0, "damping": 3.0}}, {}],
     },
     "tandem": {"rotors": [{"hub": [0.9, 0.0, -0.1]}, {"hub": [-0.9, 0.0, -0.3]}]},
     "single_upside_down": {"rotors": [{"hub": [0.1, 0.2, 0.3], "shaft_direction": [0.0, 0.0, 1.0]}]},

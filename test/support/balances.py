@@ -66,12 +66,12 @@ def azimuths(aircraft, x, psi0):
     ])  # fmt: skip
 
 
-def totals(aircraft, x, psi0):
+def totals(aircraft, x, psi0, swash=None):
     """Return linear and angular momentum, NED, and energy of body, blades and transmissions."""
     plain, size = at_speeds(aircraft, x), aircraft.layout.drives_start
     psi = azimuths(aircraft, x, psi0)
-    p, h = momentum(plain, x[:size], psi)
-    total = energy(plain, x[:size], psi)
+    p, h = momentum(plain, x[:size], psi, swash)
+    total = energy(plain, x[:size], psi, swash)
     for i, drive in enumerate(aircraft.drives):
         speed = x[aircraft.layout.drive(i)["Omega"]]
         h = h + rotation_matrix(x[S.ATTITUDE : S.VELOCITY]) @ (drive.inertia * speed * drive.inertia_axis)
@@ -79,10 +79,10 @@ def totals(aircraft, x, psi0):
     return p, h, total
 
 
-def rates_of_totals(aircraft, x, dx, psi0):
+def rates_of_totals(aircraft, x, dx, psi0, swash=None):
     """Return the rates of `totals` while a state changes at a rate and rotors without a drive turn."""
     turning = [0.0 if i >= 0 else rotor.speed for rotor, (i, _) in zip(aircraft.rotors, ratios(aircraft), strict=True)]
-    found = totals(aircraft, x + 1j * TINY * dx, psi0 + 1j * TINY * np.array(turning))
+    found = totals(aircraft, x + 1j * TINY * dx, psi0 + 1j * TINY * np.array(turning), swash)
     return [np.imag(part) / TINY for part in found]
 
 

@@ -179,8 +179,10 @@ def mass_points(rotor, second_moment=None):
     Returns
     -------
     list of (float, float)
-        Station s from the flap hinge [m] and mass [kg].
+        Station s from the flap hinge [m] and mass [kg]; of a blade with offsets the stations are those of `Blade.arm`.
     """
+    if has_offsets(rotor):
+        return offset_mass_points(rotor)
     length = rotor.radius - rotor.hinge_offset
     if second_moment is None:
         second_moment = flap_inertia(rotor)
@@ -193,6 +195,50 @@ def mass_points(rotor, second_moment=None):
 def stands_on_ground(ac):
     """Return whether contact points carry it (section 7.7)."""
     return getattr(ac, "has_contact", False)
+
+
+def has_offsets(rotor):
+    """Return whether quarter chord or mass are off the pitch axis, or the axis off the flap hinge."""
+    return getattr(rotor, "has_offsets", False)
+
+
+def undersling_of(rotor):
+    """Return by how much the blade's axis passes outboard of the flap hinge and over it [m], eq. (3.12)."""
+    return -rotor.undersling * np.sin(rotor.flap_rest), -rotor.undersling * np.cos(rotor.flap_rest)
+
+
+def offset_mass_points(rotor):
+    """Return points (s, along the chord, normal to it) [m] and masses [kg]: a sum over many, piece by piece."""
+    length, shift = rotor.radius - rotor.hinge_offset, undersling_of(rotor)[0]
+    knots = {0.0, length}
+    for name in ("mass", "centre", "twist"):
+        stations = getattr(rotor, f"{name}_stations")
+        knots |= {s * rotor.radius - rotor.hinge_offset for s in ([] if stations is None else stations)}
+    knots = [s for s in sorted(knots) if 0.0 <= s <= length]
+    nodes, weights = np.polynomial.legendre.leggauss(7)
+    places = [(a + b) / 2 + (b - a) / 2 * x for a, b in pairwise(knots) for x in nodes]
+    widths = [(b - a) / 2 * w for a, b in pairwise(knots) for w in weights]
+    if rotor.mass_stations is not None:
+        masses = [w * along_blade(rotor, "mass", s) for s, w in zip(places, widths, strict=True)]
+        places, masses = [*places, length], [*masses, rotor.tip_mass]
+    else:  # the parabola with the integrals that the file gives
+        powers = [
+            [sum(w * s ** (i + k) for s, w in zip(places, widths, strict=True)) for k in range(3)] for i in range(3)
+        ]
+        integrals = [rotor.blade_mass, rotor.blade_mass * rotor.blade_cg, flap_inertia(rotor)]
+        factors = np.linalg.solve(powers, integrals)
+        masses = [w * (factors @ [1.0, s, s * s]) for s, w in zip(places, widths, strict=True)]
+    points = []
+    for s, mass in zip(places, masses, strict=True):
+        offset, twist = offset_at(rotor, "centre", s), along_blade(rotor, "twist", s)
+        points.append(((s + shift, offset * np.cos(twist), offset * np.sin(twist)), mass))
+    return points
+
+
+def offset_at(rotor, name, s):
+    """Return the offset of the quarter chord or of the centre of gravity at a station [m], 0 where none is given."""
+    given = getattr(rotor, f"{name}_root"), getattr(rotor, f"{name}_stations")
+    return 0.0 if all(value is None for value in given) else along_blade(rotor, name, s)
 
 
 def stands(ac):
@@ -226,9 +272,12 @@ def body_mass(ac):
         # Four azimuths average second-order harmonics exactly, and the inertia has none higher.
         for azimuth in (0.0, np.pi / 2, np.pi, 3 * np.pi / 2):
             span = -np.cos(azimuth) * x_hub + rotor.rotation * np.sin(azimuth) * y_hub
-            for s, point_mass in mass_points(rotor):
+            for point, point_mass in mass_points(rotor):
                 share = point_mass * rotor.blades / 4
-                r = np.asarray(rotor.hub) + (rotor.hinge_offset + s) * span
+                s, along, up = point if isinstance(point, tuple) else (point, 0.0, 0.0)
+                up += undersling_of(rotor)[1] if has_offsets(rotor) else 0.0
+                ahead = np.sin(azimuth) * x_hub + rotor.rotation * np.cos(azimuth) * y_hub
+                r = np.asarray(rotor.hub) + (rotor.hinge_offset + s) * span + along * ahead + up * rotor.shaft_direction
                 mass = mass - share
                 first_moment = first_moment - share * r
                 inertia = inertia - share * (r @ r * np.eye(3) - np.outer(r, r))
@@ -260,6 +309,7 @@ class Blade(NamedTuple):
     w_hub: np.ndarray
     w_lag: np.ndarray
     w_blade: np.ndarray
+    pitch: tuple = (0.0, 0.0, 0.0, 0.0)  # [rad], its rate, and its first and second derivative by the azimuth
 
     @property
     def lag_arm(self):
@@ -273,7 +323,29 @@ class Blade(NamedTuple):
 
     def position(self, s):
         """Return the point at station s [m] relative to the hub [m], body axes."""
-        return self.lag_arm + self.flap_arm + s * self.d
+        return self.lag_arm + self.flap_arm + self.arm(s)
+
+    def fixed_arm(self, point):
+        """Return the part of the way from the flap hinge to a point that does not turn with the pitch [m]."""
+        if not isinstance(point, tuple):
+            return point * self.d
+        return point[0] * self.d + undersling_of(self.rotor)[1] * self.n
+
+    def pitched_arm(self, point):
+        """Return the part that does [m]: along the chord of zero twist, and normal to it."""
+        if not isinstance(point, tuple):
+            return np.zeros(3)
+        c, s = np.cos(self.pitch[0]), np.sin(self.pitch[0])
+        return (point[1] * c - point[2] * s) * self.t + (point[1] * s + point[2] * c) * self.n
+
+    def arm(self, point):
+        """Return the way from the flap hinge to a point [m]: its distance, or with those along and across the chord."""
+        return self.fixed_arm(point) + self.pitched_arm(point)
+
+    @property
+    def w_pitch(self):
+        """Angular velocity of the pitch, leading edge up [rad/s]."""
+        return self.rotor.rotation * self.pitch[1] * self.d
 
     def velocity(self, s, hub_velocity):
         """Return the velocity [m/s] of the point at station s, body axes, in the frame of `hub_velocity`."""
@@ -281,7 +353,8 @@ class Blade(NamedTuple):
             hub_velocity
             + cross(self.w_hub, self.lag_arm)
             + cross(self.w_lag, self.flap_arm)
-            + s * cross(self.w_blade, self.d)
+            + cross(self.w_blade, self.arm(s))
+            + cross(self.w_pitch, self.pitched_arm(s))
         )
 
     def acceleration(self, s, hub_acceleration, body_rate_dot, flap_dd, lag_dd):
@@ -302,14 +375,21 @@ class Blade(NamedTuple):
         alpha_hub = body_rate_dot + cross(self.body_rate, g * omega * self.u) + g * speed_rate(self.rotor) * self.u
         alpha_lag = alpha_hub - g * lag_dd * self.u - g * self.lag_rate * cross(self.w_hub, self.u)
         alpha_blade = alpha_lag + flap_dd * self.f + self.flap_rate * cross(self.w_lag, self.f)
+        arm, pitched = self.fixed_arm(s), self.pitched_arm(s)
+        w = self.w_blade + self.w_pitch
+        pitch_dd = self.pitch[3] * omega**2 + self.pitch[2] * speed_rate(self.rotor)
+        pitch_dd -= self.rotor.pitch_flap_coupling * flap_dd + self.rotor.pitch_lag_coupling * lag_dd
+        alpha = alpha_blade + g * pitch_dd * self.d + cross(self.w_blade, self.w_pitch)
         return (
             hub_acceleration
             + cross(alpha_hub, self.lag_arm)
             + cross(self.w_hub, cross(self.w_hub, self.lag_arm))
             + cross(alpha_lag, self.flap_arm)
             + cross(self.w_lag, cross(self.w_lag, self.flap_arm))
-            + s * cross(alpha_blade, self.d)
-            + s * cross(self.w_blade, cross(self.w_blade, self.d))
+            + cross(alpha_blade, arm)
+            + cross(self.w_blade, cross(self.w_blade, arm))
+            + cross(alpha, pitched)
+            + cross(w, cross(w, pitched))
         )
 
 
@@ -364,9 +444,10 @@ def make_blade(rotor, azimuth, flap, flap_rate, lag, lag_rate, body_rate):
     )
 
 
-def make_blades(ac, state, psi):
-    """Return, per rotor, the list of its `Blade`s, from the split state and the azimuths psi [rad]."""
+def make_blades(ac, state, psi, swash=None):
+    """Return, per rotor, the list of its `Blade`s, from the split state, azimuths psi and swashplate angles [rad]."""
     rotors = []
+    swash = np.zeros((len(ac.rotors), 3)) if swash is None else swash
     for j, rotor in enumerate(ac.rotors):
         transform = multiblade_matrix(rotor.blades, psi[j])
         transform_dot = rotor.speed * multiblade_matrix(rotor.blades, psi[j], 1)
@@ -374,13 +455,19 @@ def make_blades(ac, state, psi):
         flap_rate = transform @ state.flap_rate[j] + transform_dot @ state.flap[j]
         lag_rate = transform @ state.lag_rate[j] + transform_dot @ state.lag[j]
         azimuths = blade_azimuths(rotor.blades, psi[j])
-        rotors.append(
-            [
-                make_blade(rotor, azimuths[k], flap[k], flap_rate[k], lag[k], lag_rate[k], state.rate)
-                for k in range(rotor.blades)
-            ]
-        )
+        own = [
+            make_blade(rotor, azimuths[k], flap[k], flap_rate[k], lag[k], lag_rate[k], state.rate)
+            for k in range(rotor.blades)
+        ]
+        rotors.append([blade._replace(pitch=pitch_of(blade, swash[j])) for blade in own])
     return rotors
+
+
+def pitch_of(blade, swash):
+    """Return pitch [rad], its rate [rad/s], and its derivatives by the azimuth."""
+    swing, g = blade.azimuth + blade.rotor.swashplate_phase, blade.rotor.rotation
+    slope = swash[1] * g * np.sin(swing) - swash[2] * np.cos(swing)
+    return (*hinge_pitch(blade, swash), slope, swash[1] * g * np.cos(swing) + swash[2] * np.sin(swing))
 
 
 # ------------------------------------------------------------------------------------------------------------
@@ -481,11 +568,20 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
         s, ds = (inner + outer) / 2, outer - inner
         chord = along_blade(rotor, "chord", s)
         pitch = hinge_pitch(blade, swash)[0] + along_blade(rotor, "twist", s)
-        velocity = blade.velocity(s, air_velocity_hub)
+        point = s
+        if has_offsets(rotor):
+            offset, twist = offset_at(rotor, "quarter", s), along_blade(rotor, "twist", s)
+            point = (s + undersling_of(rotor)[0], offset * np.cos(twist), offset * np.sin(twist))
+        velocity = blade.velocity(point, air_velocity_hub)
         cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
         induced = (
-            blade_inflow_speed(rotor) * rotor.radius * (lambda0 + (rotor.hinge_offset + s) / rotor.radius * cyclic)
+            blade_inflow_speed(rotor)
+            * rotor.radius
+            * (lambda0 + (rotor.hinge_offset + span_of(point)) / rotor.radius * cyclic)
         )
+        if has_offsets(rotor):
+            loads.append((point, swept_force(ac, blade, inner, outer, pitch, velocity + induced * blade.u)))
+            continue
         u_t = velocity @ blade.t
         u_p = velocity @ blade.n + induced * np.cos(blade.flap)
         # The section sees the flow across the span only: |V| is the speed in the plane of t and n.
@@ -503,6 +599,49 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
         force = pressure * ((cl * u_t - cd * u_p) * blade.n - (cl * u_p + cd * u_t) * blade.t)
         loads.append((s, force))
     return loads
+
+
+def span_of(point):
+    """Return the distance of a point from the flap hinge along the span [m]."""
+    return point[0] if isinstance(point, tuple) else point
+
+
+def swept_force(ac, blade, inner, outer, pitch, velocity):
+    """Return the force [N] of an element from inner to outer, whose section lies across its quarter-chord line.
+
+    `velocity` is that of the quarter chord relative to the air there, the induced one included; the angle of attack is
+    that between it and the chord, in the plane across the line.
+    """
+    rotor, air = blade.rotor, ac.environment
+    s, ds, step = (inner + outer) / 2, outer - inner, 1e-7
+    length = rotor.radius - rotor.hinge_offset
+    slope = (offset_at(rotor, "quarter", s + step) - offset_at(rotor, "quarter", s - step)) / (2 * step)
+    if rotor.quarter_stations is None:  # exactly
+        slope = (offset_at(rotor, "quarter", length) - offset_at(rotor, "quarter", 0.0)) / length
+    else:
+        places = rotor.quarter_stations * rotor.radius - rotor.hinge_offset
+        pieces = zip(pairwise(places), pairwise(rotor.quarter_values), strict=True)
+        slope = sum((d - c) / (b - a) for (a, b), (c, d) in pieces if a <= s < b)
+    chord_line = np.cos(pitch) * blade.t + np.sin(pitch) * blade.n
+    up = np.cos(pitch) * blade.n - np.sin(pitch) * blade.t
+    tangent = (blade.d + slope * chord_line) / np.sqrt(1 + slope**2)
+    across = (chord_line - slope * blade.d) / np.sqrt(1 + slope**2)
+    assert abs(tangent @ across) < 1e-12
+    u_across, u_up = velocity @ across, velocity @ up
+    speed = np.hypot(u_across, u_up)
+    chord = along_blade(rotor, "chord", s)
+    airfoil = ac.airfoils[airfoil_at(rotor, (rotor.hinge_offset + s) / rotor.radius)]
+    cl, cd = airfoil_coefficients(
+        airfoil,
+        speed / air.speed_of_sound
+        if airfoil.axis == "mach"
+        else speed * chord / np.sqrt(1 + slope**2) / air.kinematic_viscosity,
+        -np.arctan2(u_up, u_across),
+        ac.options.interpolation,
+    )
+    cl = cl * np.clip((rotor.tip_loss * rotor.radius - rotor.hinge_offset - inner) / ds, 0.0, 1.0)
+    pressure = 0.5 * air.air_density * chord * speed * ds
+    return pressure * ((cl * u_across - cd * u_up) * up - (cl * u_up + cd * u_across) * across)
 
 
 def flat_plate_force(ac, air_velocity):
@@ -564,7 +703,7 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
     thrust = moment_c = moment_s = 0.0
     for blade, elements in zip(blades, air_loads, strict=True):
         for s, force in elements:
-            r = rotor.hinge_offset + s
+            r = rotor.hinge_offset + span_of(s)
             thrust += u @ force
             moment_c += r * (blade.n @ force) * np.cos(blade.azimuth)
             moment_s += r * (blade.n @ force) * np.sin(blade.azimuth)
@@ -758,15 +897,41 @@ def hinge_residuals(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, 
     for s, point_mass in mass_points(rotor, inertia):
         a = blade.acceleration(s, hub_acceleration, alpha, flap_dd, lag_dd)
         loads.append((s, point_mass * (instant.gravity - a)))
-    about_flap, about_lag = np.zeros(3), np.zeros(3)
+    about_flap, about_lag, feather = np.zeros(3), np.zeros(3), 0.0
     for s, load in loads:
-        about_flap += cross(s * blade.d, load)
-        about_lag += cross(blade.flap_arm + s * blade.d, load)
+        about_flap += cross(blade.arm(s), load)
+        about_lag += cross(blade.flap_arm + blade.arm(s), load)
+        feather += rotor.rotation * blade.d @ cross(blade.pitched_arm(s), load)
     flap = blade.f @ about_flap - rotor.flap_spring * (blade.flap - rotor.flap_rest)
     lag = -rotor.rotation * blade.u @ about_lag - rotor.lag_spring * (blade.lag - rotor.lag_rest)
     flap_damper, lag_damper = damper_moments(rotor, blade, instant.pitches[j][k])
+    lag += lag_stop_moment(rotor, blade)
+    flap, lag = flap - rotor.pitch_flap_coupling * feather, lag - rotor.pitch_lag_coupling * feather
     factor = 1.0 if rotor.blade_lag_damping is None else rotor.blade_lag_damping[k]
     return flap + factor * flap_damper, lag + factor * (lag_damper - rotor.lag_damping * blade.lag_rate)
+
+
+def lag_stop_moment(rotor, blade):
+    """Return the moment [N m] of the lag stops that raises the lag angle: spring and damper, that never pull."""
+    if getattr(rotor, "lag_stops", None) is None:
+        return 0.0
+    for sign, end in zip((1.0, -1.0), reversed(rotor.lag_stops), strict=True):
+        beyond, rate = sign * (blade.lag - end), sign * blade.lag_rate
+        if beyond > 0:
+            return -sign * max(0.0, rotor.lag_stop_spring * beyond + rotor.lag_stop_damping * rate)
+    return 0.0
+
+
+def feather_moment(instant, j, k, origin_acceleration, body_rate_dot, flap_dd, lag_dd):
+    """Return the moment [N m] of air, weight and inertia about a blade's pitch axis, leading edge up."""
+    rotor, blade = instant.ac.rotors[j], instant.blades[j][k]
+    hub_acceleration, alpha = hub_motion(instant, rotor, origin_acceleration, body_rate_dot)
+    loads = list(instant.air_loads[j][k])
+    for s, point_mass in mass_points(rotor):
+        loads.append(
+            (s, point_mass * (instant.gravity - blade.acceleration(s, hub_acceleration, alpha, flap_dd, lag_dd)))
+        )
+    return sum(rotor.rotation * blade.d @ cross(blade.pitched_arm(s), load) for s, load in loads)
 
 
 def damper_length(rotor, flap, lag, pitch):
@@ -879,7 +1044,7 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
     state = split_state(ac, x, lead_lag, cyclic_inflow)
     attitude = rotation_matrix(state.quaternion)
     air_velocity = state.velocity - attitude.T @ np.asarray(wind, dtype=float)
-    blades = make_blades(ac, state, psi)
+    blades = make_blades(ac, state, psi, swash)
     part_force, part_moment = part_loads(ac, air_velocity, state.rate, state.inflow)
     hub_velocities = [air_velocity + cross(state.rate, np.asarray(rotor.hub, dtype=float)) for rotor in ac.rotors]
     washes = all_washes(ac, state.inflow, hub_velocities)
@@ -977,7 +1142,12 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
         force, moment = hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd[j], lag_dd[j])
         u = np.asarray(rotor.shaft_direction, dtype=float)
         loads["thrust"].append(aerodynamic_thrust(instant, j))
-        loads["torque"].append(-rotor.rotation * u @ moment)
+        torque = -rotor.rotation * u @ moment
+        if has_offsets(rotor):  # the shaft pitches the blades as it turns them
+            for k, blade in enumerate(instant.blades[j]):
+                motion = origin_acceleration, body_rate_dot, flap_dd[j][k], lag_dd[j][k]
+                torque -= blade.pitch[2] * feather_moment(instant, j, k, *motion)
+        loads["torque"].append(torque)
         loads["force"].append(force)
         loads["moment"].append(moment)
         loads["duct"].append(u @ duct_load(instant, j)[0])
@@ -1003,9 +1173,9 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
 # ------------------------------------------------------------------------------------------------------------
 
 
-def _blade_points(ac, state, psi):
+def _blade_points(ac, state, psi, swash=None):
     """Yield each point's position from the body origin [m], inertial velocity [m/s] and mass [kg]."""
-    for j, blades in enumerate(make_blades(ac, state, psi)):
+    for j, blades in enumerate(make_blades(ac, state, psi, swash)):
         hub = np.asarray(ac.rotors[j].hub, dtype=float)
         hub_velocity = state.velocity + cross(state.rate, hub)
         for blade in blades:
@@ -1013,16 +1183,16 @@ def _blade_points(ac, state, psi):
                 yield hub + blade.position(s), blade.velocity(s, hub_velocity), point_mass
 
 
-def first_moment(ac, x, psi):
+def first_moment(ac, x, psi, swash=None):
     """Return the first moment of fuselage and blades about the inertial origin [kg m], NED, shape (3,)."""
     state = split_state(ac, x)
     mass, about_origin, _ = body_mass(ac)
-    for position, _, point_mass in _blade_points(ac, state, psi):
+    for position, _, point_mass in _blade_points(ac, state, psi, swash):
         mass, about_origin = mass + point_mass, about_origin + point_mass * position
     return mass * state.position + rotation_matrix(state.quaternion) @ about_origin
 
 
-def momentum(ac, x, psi):
+def momentum(ac, x, psi, swash=None):
     """Return linear and angular momentum of fuselage and blades; for `complete` coupling.
 
     Parameters
@@ -1042,7 +1212,7 @@ def momentum(ac, x, psi):
     mass, about_origin, inertia = body_mass(ac)
     linear = mass * state.velocity + cross(state.rate, about_origin)
     angular = cross(about_origin, state.velocity) + inertia @ state.rate
-    for position, velocity, point_mass in _blade_points(ac, state, psi):
+    for position, velocity, point_mass in _blade_points(ac, state, psi, swash):
         linear = linear + point_mass * velocity
         angular = angular + cross(position, point_mass * velocity)
     attitude = rotation_matrix(state.quaternion)
@@ -1050,7 +1220,7 @@ def momentum(ac, x, psi):
     return p, cross(state.position, p) + attitude @ angular
 
 
-def energy(ac, x, psi):
+def energy(ac, x, psi, swash=None):
     """Return kinetic energy plus that of weight and springs [J]; for `complete` coupling.
 
     Each drive adds torque times speed, the lag dampers take C xi'^2, and the air its share.
@@ -1059,7 +1229,7 @@ def energy(ac, x, psi):
     mass, about_origin, inertia = body_mass(ac)
     v, om = state.velocity, state.rate
     total = 0.5 * mass * v @ v + v @ cross(om, about_origin) + 0.5 * om @ inertia @ om
-    for _, velocity, point_mass in _blade_points(ac, state, psi):
+    for _, velocity, point_mass in _blade_points(ac, state, psi, swash):
         total = total + 0.5 * point_mass * velocity @ velocity
     for rotor, blades in zip(ac.rotors, make_blades(ac, state, psi), strict=True):
         for blade in blades:
@@ -1069,7 +1239,7 @@ def energy(ac, x, psi):
         r = rotation_matrix(state.quaternion).T @ state.position
         q, springs = state.quaternion[1:], ac.body.stand_spring
         total = total + 0.5 * (ac.body.stand_mass[:3] * v @ v + springs[:3] * r @ r) + 2 * springs[3:] * q @ q
-    return total - ac.environment.gravity * first_moment(ac, x, psi)[2]
+    return total - ac.environment.gravity * first_moment(ac, x, psi, swash)[2]
 
 
 # ------------------------------------------------------------------------------------------------------------

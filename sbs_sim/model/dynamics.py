@@ -50,7 +50,7 @@ from sbs_sim.model.blade import (
 from sbs_sim.model.duct import duct_flow, duct_thrust, sheltered
 from sbs_sim.model.frames import quaternion_rates, rotation, shaft_down
 from sbs_sim.model.fuselage import plate_drag
-from sbs_sim.model.inflow import INVERSE_MASS, Inflow, disc_flow, inflow_rates
+from sbs_sim.model.inflow import INVERSE_MASS, Inflow, inflow_rates, rotor_flow
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
 from sbs_sim.model.section import section_loads
@@ -881,9 +881,9 @@ def set_inflow_rates(aircraft, memory, j, dx):
         rounded(total.sine_moment * moment_scale),
     )
     if aircraft.switches[0].ducts == 1:
-        flow = disc_flow(x[uniform], sheltered(rotor.duct_turning, mu), rotor.sense)
+        flow = rotor_flow(rotor, x[uniform], sheltered(rotor.duct_turning, mu))
     else:
-        flow = disc_flow(x[uniform], mu, rotor.sense)
+        flow = rotor_flow(rotor, x[uniform], mu)
     states = Inflow(x[uniform], x[cosine], x[sine])
     rates = inflow_rates(rotor, states, flow, loads, aircraft.switches[0].cyclic_inflow)
     dx[uniform], dx[cosine], dx[sine] = rates.uniform, rates.cosine, rates.sine

@@ -12,6 +12,7 @@ from sbs_sim.aircraft.blade_offsets import blade_moments
 from sbs_sim.aircraft.description import CONTACT, STAND_AXES, TRIMMED_CONTROLS, Array, MixingSchedule, Range, Rotor
 from sbs_sim.aircraft.part_consistency import part_problems
 from sbs_sim.model.airfoil import FINEST_DEG, MAX_HALF, NUMBER_NAMES, common_half
+from sbs_sim.model.descent import POWER_FACTOR
 from sbs_sim.model.state import CONTROL_NAMES, EULER_NAMES, SWASHPLATE_NAMES
 
 if TYPE_CHECKING:
@@ -320,6 +321,12 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
     relations += [
         (rotor.duct_exit is None or rotor.duct_expansion == 0.5, "duct_expansion", "0.5, with duct.exit_area"),
     ]
+    if rotor.descent == "measured":
+        factor = f"{POWER_FACTOR:g}, with descent = measured"
+        relations += [
+            (rotor.wake_expansion == 0.5 and rotor.duct_exit is None, "descent", "momentum, of a rotor with a duct"),
+            (rotor.induced_power_factor == POWER_FACTOR, "induced_power_factor", factor),
+        ]
     factors = rotor.lag_damping_factors
     relations += [
         (len(factors) == rotor.blades, "blade_lag_damping", f"a list of {rotor.blades}, one of each blade"),

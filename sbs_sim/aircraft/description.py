@@ -761,6 +761,12 @@ class Rotor(ByContent):
         symbol=r"\kappa_i",
         default=1.0,
     )
+    descent: str = choice(
+        "momentum: momentum theory in all flight; measured: inflow of vortex ring, turbulent wake and windmill as"
+        " measured, of an open rotor with an induced_power_factor of 1.1, which the measurement has in hover",
+        ("momentum", "measured"),
+        default="momentum",
+    )
     collective_range: Range = interval("Range of the collective of the swashplate", -90, 90, "deg", is_physics=False)
     cyclic_range: Range = interval("Range of each cyclic of the swashplate", -90, 90, "deg", is_physics=False)
     swashplate_rate: float = number(

@@ -307,6 +307,7 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
             "blades": rotor.blades,
             "harmonics": harmonic_count(rotor.blades),
             "teetering": rotor.is_teetering,
+            "measured_descent": rotor.descent == "measured",
             "first_quad": quads[j],
             "quads": quads[j + 1] - quads[j],
             "flap": layout.flap(j).start,

@@ -22,6 +22,7 @@ from sbs_sim.content import ByContent
 from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import AirfoilTable
+from sbs_sim.model.descent import measured_axial
 from sbs_sim.model.solve import smallest
 
 Array = NDArray[np.float64]
@@ -30,6 +31,7 @@ LIFT_ANGLE = math.radians(6.0)  # the lift curve is straight through its points 
 MIN_SLOPE = 1.0  # 1/rad, of a lift curve; that of thin airfoils is 2 pi
 MIN_LOADING = 0.01  # of the mean disc loading: a rotor with less has the flow of this, for without any Newton is lost
 MAX_STEPS, MAX_MOMENTUM_STEPS = 12, 20
+MAX_HALVINGS = 30
 TOLERANCE = 1e-3  # of the weight, and rad: what follows is Newton's
 DIGITS = 9  # decimal places of a guess
 MAX_STEP = 0.15  # rad, of a control, but for the first step, which goes all the way to the wanted thrust
@@ -95,7 +97,7 @@ class MomentumRotor:
         rotor = aircraft.rotors[j]
         self.speed, self.sense = rotor.speed, rotor.rotation
         self.rigging = aircraft.trim_rigging[3 * j : 3 * j + 3]
-        self._power_factor = rotor.induced_power_factor
+        self._power_factor, self._is_measured = rotor.induced_power_factor, rotor.descent == "measured"
         self.tip_speed, self.area = rotor.speed * rotor.radius, math.pi * rotor.radius**2
         self._axes = model.rotors["axes"][j, :, :, 0]
         self.upward = max(0.0, float(self._axes[2, 2]))
@@ -167,6 +169,9 @@ class MomentumRotor:
         """
         sign, hover2 = math.copysign(1.0, thrust), abs(thrust) / self._mass_flow
         climb = sign * self._axial
+        if self._is_measured and climb < 0.0:
+            v, slope = self._measured(hover2, -climb)
+            return sign * v, 1.0 / (self._mass_flow * slope)
         v = math.sqrt(hover2) + max(0.0, -climb)
         for _ in range(MAX_MOMENTUM_STEPS):
             flow = math.hypot(self._edgewise, v + climb)
@@ -176,6 +181,16 @@ class MomentumRotor:
             if abs(change) <= 1e-6 * v:
                 break
         return sign * v, 1.0 / (self._mass_flow * slope)
+
+    def _measured(self, hover2: float, descent: float) -> tuple[float, float]:
+        """Induced velocity in descent as measured, by halving, and the slope of v |V|, which grows with it."""
+        low, high = 0.0, 4.0 * math.sqrt(hover2)
+        for _ in range(MAX_HALVINGS):
+            v = 0.5 * (low + high)
+            axial, growth = measured_axial(v, descent)
+            flow = math.hypot(self._edgewise, axial)
+            low, high = (v, high) if v * flow < hover2 else (low, v)
+        return v, flow + axial * (growth - axial) / flow
 
     def respond(self, thrust: float, swash: list[float], least: float) -> Response:
         """What goes with a thrust and cyclic angles; below `least` the inflow is linear in the thrust."""

@@ -154,7 +154,10 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
     for j, (rotor, row) in enumerate(zip(aircraft.rotors, rows, strict=True)):
         found += blade_warnings(rotor)
         state = working_state(row)
-        if state.inflow_state in (VORTEX_RING, TURBULENT_WAKE):
+        if rotor.descent == "measured":
+            if state.inflow_state == VORTEX_RING:
+                found.append(f"{rotor.name}: {VORTEX_RING} state, whose unsteadiness is missing")
+        elif state.inflow_state in (VORTEX_RING, TURBULENT_WAKE):
             found.append(f"{rotor.name}: {state.inflow_state} state, where momentum theory does not hold")
         if state.advance_ratio > MAX_ADVANCE_RATIO:
             found.append(f"{rotor.name}: advance ratio above {MAX_ADVANCE_RATIO:g}")

@@ -55,7 +55,7 @@ from sbs_sim.model.duct import duct_flow, duct_thrust, sheltered
 from sbs_sim.model.frames import quaternion_rates, rotation, shaft_down
 from sbs_sim.model.fuselage import plate_drag
 from sbs_sim.model.ground_effect import add_ground_wash
-from sbs_sim.model.inflow import INVERSE_MASS, Inflow, disc_flow, inflow_rates
+from sbs_sim.model.inflow import INVERSE_MASS, Inflow, inflow_rates, rotor_flow
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
 from sbs_sim.model.offset import (
@@ -1016,11 +1016,11 @@ def flow_of_disc(aircraft, memory, j):
     mu = memory.flow[j].velocity * rotor.inverse_tip_speed
     if aircraft.switches[0].wash == 1:
         met = sheltered(rotor.duct_turning, met_with_wash(memory, j, mu))
-        flow = disc_flow(uniform, met, rotor.sense)
+        flow = rotor_flow(rotor, uniform, met)
     elif aircraft.switches[0].ducts == 1:
-        flow = disc_flow(uniform, sheltered(rotor.duct_turning, mu), rotor.sense)
+        flow = rotor_flow(rotor, uniform, sheltered(rotor.duct_turning, mu))
     else:
-        flow = disc_flow(uniform, mu, rotor.sense)
+        flow = rotor_flow(rotor, uniform, mu)
     return flow
 
 

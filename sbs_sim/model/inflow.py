@@ -8,6 +8,7 @@ import math
 from typing import Any, NamedTuple
 
 from sbs_sim.lanes import Vector, as_lanes, as_records, cross, dot, select, sqrt
+from sbs_sim.model.descent import measured_flow
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.state import COSINE, SINE, UNIFORM, vector_at
 
@@ -45,12 +46,27 @@ class DiscFlow(NamedTuple):
 
 
 @kernel
+def rotor_flow(rotor, lambda0, mu):
+    """Flow through the disc of a rotor; mu is the hub's velocity relative to the air over the tip speed, hub axes."""
+    if rotor.measured_descent == 1:
+        axial, growth = measured_flow(lambda0, mu.z)
+        return flow_of(axial, growth, mu, rotor.sense)
+    return disc_flow(lambda0, mu, rotor.sense)
+
+
+@kernel
 def disc_flow(lambda0, mu, sense):
-    """Flow through a disc; mu is the velocity of the hub relative to the air over the tip speed, hub axes."""
+    """Flow through a disc by momentum theory; mu as for `rotor_flow`."""
     through = lambda0 - mu.z
+    return flow_of(through, through + lambda0, mu, sense)
+
+
+@kernel
+def flow_of(through, growth, mu, sense):
+    """Flow through a disc of its axial part and of the sum of that and of lambda0 times its slope by lambda0."""
     edgewise_squared = mu.x * mu.x + mu.y * mu.y
     total = sqrt(edgewise_squared + through * through + MIN_FLOW * MIN_FLOW)
-    cyclic = (edgewise_squared + through * (through + lambda0)) / total
+    cyclic = (edgewise_squared + through * growth) / total
     inverse = 1.0 / (total + abs(through))
     return DiscFlow(total, cyclic, mu.x * inverse, -(sense * mu.y * inverse))
 
@@ -123,7 +139,7 @@ def inflow_matrix(rotors, number, lambda0, mu, cyclic, out):
     rotor = as_records(rotors)[number]
     velocity, matrix = as_lanes(mu, rotor), as_lanes(out, rotor)
     uniform = as_lanes(lambda0, rotor)[0]
-    flow = disc_flow(uniform, vector_at(velocity, 0), rotor.sense)
+    flow = rotor_flow(rotor, uniform, vector_at(velocity, 0))
     none = Inflow(0.0, 0.0, 0.0)
     for i in range(3):
         unit = Inflow(1.0 * (i == UNIFORM), 1.0 * (i == COSINE), 1.0 * (i == SINE))

@@ -93,6 +93,7 @@ ROTOR = {
     "inverse_blades": LANES,  # 1 / N_b
     "flap_rest": LANES,  # the coning of a teetering rotor
     "teetering": INTEGER,
+    "measured_descent": INTEGER,  # 1 where the inflow in descent is that of measurements
     "blades": INTEGER,  # N_b
     "harmonics": INTEGER,
     "first_quad": INTEGER,

@@ -376,10 +376,11 @@ def schema_leaves(schema, path=()):
         yield path
 
 
-# in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py
+# in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py, test_descent.py
 ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage", "flap_hinge", "schedule")
 ELSEWHERE += ("ground", "contact_points")
 ELSEWHERE += ("quarter_chord", "chordwise_cg", "undersling")
+ELSEWHERE += ("descent",)
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)
@@ -686,6 +687,16 @@ REFUSED = {
         (*R0, "duct"),
         {"turning": 0.5},
         "rotors[0].duct.exit_area: missing; allowed is 0.25 to 4",
+    ),
+    "a measured descent without its power factor": (
+        (*R0, "descent"),
+        "measured",
+        "rotors[0].induced_power_factor = 1.0: allowed is 1.1, with descent = measured",
+    ),
+    "a measured descent of a duct": (
+        R1,
+        {**sbs_data()["rotors"][1], "duct_expansion": 0.7, "induced_power_factor": 1.1, "descent": "measured"},
+        "rotors[1].descent = measured: allowed is momentum, of a rotor with a duct",
     ),
     "a distributed mass beside its integral": (
         (*R0, "mass_distribution"),

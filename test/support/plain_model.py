@@ -667,6 +667,27 @@ def all_washes(ac, inflow, hub_velocities):
     return [Wash(np.zeros(3), 0.0) for _ in ac.rotors]
 
 
+#: Castles and Gray, NACA TN 2474, Fig. 12: rate of descent and induced velocity over that of momentum theory in hover.
+CASTLES_GRAY = np.array(
+    [[0, 1.1], [0.4, 1.41], [0.8, 1.8], [1.2, 2.24], [1.5, 2.5], [1.6, 2.28], [1.8, 1.68], [2, 1.37], [2.4, 0.95]]
+)
+WINDMILL = 8.0  # rate of descent over the induced velocity from which on momentum theory holds again
+
+
+def measured_flow(lambda0, mu_z):
+    """Return the axial flow of the measured line, and its slope by lambda0."""
+    inflow = CASTLES_GRAY[:, 1] / CASTLES_GRAY[0, 1]
+    x = np.append(CASTLES_GRAY[:, 0] / inflow, WINDMILL)
+    y = np.append(inflow**-2.0, WINDMILL - 1.0)
+    rises = np.diff(y) / np.diff(x)
+    slopes = np.gradient(y, x)  # of parabolas
+    bounds = 3.0 * np.minimum(np.abs(rises[1:]), np.abs(rises[:-1])) * (rises[1:] * rises[:-1] > 0)
+    slopes[1:-1] = np.clip(slopes[1:-1], -bounds, bounds)
+    slopes[[0, -1]] = -1.0, 1.0
+    curve, at = CubicHermiteSpline(x, y, slopes), mu_z / lambda0
+    return lambda0 * curve(at), curve(at) - at * curve(at, 1)
+
+
 def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_inflow, through=0.0):
     """Return d/dt of lambda0, lambdas, lambdac [1/s], Peters and HaQuang's three states.
 
@@ -715,8 +736,11 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
     lambda0 = inflow[0]
     lam = lambda0 - mu_z
     mu2 = mu_x**2 + mu_y**2
+    slope = 1.0  # of the axial flow by lambda0
+    if rotor.descent == "measured" and 0.0 < mu_z / (lambda0 or np.inf) < WINDMILL:
+        lam, slope = measured_flow(lambda0, mu_z)
     v_t = np.sqrt(mu2 + lam**2 + INFLOW_SPEED_FLOOR**2)
-    v_m = (mu2 + lam * (lam + lambda0)) / v_t
+    v_m = (mu2 + lam * (lam + lambda0 * slope)) / v_t
     x_c = mu_x / (v_t + abs(lam))
     x_s = -g * mu_y / (v_t + abs(lam))
     x2 = x_c**2 + x_s**2
@@ -1302,6 +1326,7 @@ def table6_aircraft(environment=None, body=None, options=None, rotors=None):
         "airfoil": "smooth",
         "duct_expansion": 0.5,
         "induced_power_factor": 1.0,
+        "descent": "momentum",
         "duct_exit": None,
         "duct_turning": 1.0,
         "ram_recovery": 1.0,

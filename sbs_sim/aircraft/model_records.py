@@ -137,6 +137,7 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["scheduled"] = any(rotor.schedule for rotor in aircraft.rotors)
     switches["ducts"] = any(rotor.duct_exit is not None for rotor in aircraft.rotors)
     switches["teetering"] = any(rotor.is_teetering for rotor in aircraft.rotors)
+    switches["wash"] = 0
     return switches
 
 

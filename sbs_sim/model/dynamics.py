@@ -29,6 +29,7 @@ from sbs_sim.lanes import (
     spread,
     sqrt,
     transposed,
+    zeros_like,
 )
 from sbs_sim.model import state as S
 from sbs_sim.model.blade import (
@@ -53,6 +54,7 @@ from sbs_sim.model.fuselage import plate_drag
 from sbs_sim.model.inflow import INVERSE_MASS, Inflow, disc_flow, inflow_rates
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
+from sbs_sim.model.records import OTHERS, WASH_ROWS
 from sbs_sim.model.section import section_loads
 from sbs_sim.model.surfaces import fuselage_load, ramp, rotor_wash, surface_load
 from sbs_sim.model.teeter import hold_coning, lock_coning
@@ -96,6 +98,7 @@ class Memory(NamedTuple):
     span: Any
     coning: Any
     coning_change: Any
+    wash: Any
     commands: Any
 
 
@@ -199,6 +202,7 @@ def memory_in_lanes(work):
         span=work.span,
         coning=as_records(work.coning),
         coning_change=as_lanes(work.coning_change, sums),
+        wash=as_lanes(work.wash, sums),
         commands=as_lanes(work.commands, sums),
     )
 
@@ -231,6 +235,9 @@ def set_known_loads(aircraft, memory, flight, swash, psi):
     if aircraft.switches[0].scheduled == 1:
         set_commands(aircraft, memory, flight, swash)
         commands = memory.commands
+    if aircraft.switches[0].wash == 1:
+        set_hub_velocities(aircraft, memory, flight)
+        set_wash(aircraft, memory)
     set_blade_terms(aircraft, memory, flight, commands, psi)
     sum_blades(aircraft, memory)
     set_hub_velocities(aircraft, memory, flight)
@@ -306,7 +313,7 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
         basis = blade_basis(blade, pose)
         hub = hub_motion(blade, flight)
         motion = blade_motion(blade, basis, pose, hub.omega)
-        induced, gradient = induced_velocity(aircraft, memory.state, blade, pose)
+        induced, gradient = induced_velocity(aircraft, memory, blade, pose)
         air_velocity = hub.air_velocity
         if aircraft.switches[0].ducts == 1:
             air_velocity = sheltered(blade.duct_turning, air_velocity)
@@ -327,13 +334,27 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
 
 
 @kernel
-def induced_velocity(aircraft, x, blade, pose):
+def set_wash(aircraft, memory):
+    """Set what others add to the inflow of every rotor, from the inflow states and the velocities of the hubs."""
+    for j in range(aircraft.rotors.shape[0]):
+        for row in range(WASH_ROWS):
+            memory.wash[row, j] = zeros_like(aircraft.rotors[j].radius)
+
+
+@kernel
+def induced_velocity(aircraft, memory, blade, pose):
     """Induced velocity at the hub [m/s], and its slope along the radius at the azimuth of blades [1/s], eq. (4.2)."""
-    inflow, quad = aircraft.indices.inflow, blade.quad
-    lambda0, lambdas, lambdac = inflow[S.UNIFORM], inflow[S.SINE], inflow[S.COSINE]
-    sine_part = spread(x, lambdas, quad, blade) * pose.sine
-    gradient = blade.inflow_speed * (spread(x, lambdac, quad, blade) * pose.cosine + sine_part)
-    return blade.inflow_speed * blade.radius * spread(x, lambda0, quad, blade), gradient
+    inflow, quad, x = aircraft.indices.inflow, blade.quad, memory.state
+    lambda0 = spread(x, inflow[S.UNIFORM], quad, blade)
+    lambdas, lambdac = spread(x, inflow[S.SINE], quad, blade), spread(x, inflow[S.COSINE], quad, blade)
+    if aircraft.switches[0].wash == 1:
+        wash, rotor = memory.wash, aircraft.indices.azimuth
+        lambda0 = lambda0 + spread(wash[S.UNIFORM], rotor, quad, blade)
+        lambdas = lambdas + spread(wash[S.SINE], rotor, quad, blade)
+        lambdac = lambdac + spread(wash[S.COSINE], rotor, quad, blade)
+    sine_part = lambdas * pose.sine
+    gradient = blade.inflow_speed * (lambdac * pose.cosine + sine_part)
+    return blade.inflow_speed * blade.radius * lambda0, gradient
 
 
 @kernel
@@ -531,7 +552,7 @@ def duct_load(aircraft, memory, j):
     moment = cross(rotor.hub, force)
     if aircraft.switches[0].ducts == 1:
         mu = memory.flow[j].velocity * rotor.inverse_tip_speed
-        flow = duct_flow(rotor, memory.state[rotor.inflow + S.UNIFORM], mu)
+        flow = flow_of_duct(aircraft, memory, j)
         scale = aircraft.air[0].density * rotor.momentum_scale
         drag = scale * flow.mass_flow * rotor.duct_turning
         with_exit = rotor.axes @ Vector(-(drag * mu.x), -(drag * mu.y), -(scale * flow.duct))
@@ -868,11 +889,42 @@ def set_rotor_rates(aircraft, memory, dx):
 
 
 @kernel
+def flow_of_disc(aircraft, memory, j):
+    """Flow through a disc; the wash of other rotors is part of the air that comes to it."""
+    rotor, uniform = aircraft.rotors[j], memory.state[aircraft.rotors[j].inflow + S.UNIFORM]
+    mu = memory.flow[j].velocity * rotor.inverse_tip_speed
+    if aircraft.switches[0].wash == 1:
+        met = sheltered(rotor.duct_turning, met_with_wash(memory, j, mu))
+        flow = disc_flow(uniform, met, rotor.sense)
+    elif aircraft.switches[0].ducts == 1:
+        flow = disc_flow(uniform, sheltered(rotor.duct_turning, mu), rotor.sense)
+    else:
+        flow = disc_flow(uniform, mu, rotor.sense)
+    return flow
+
+
+@kernel
+def flow_of_duct(aircraft, memory, j):
+    """Thrusts of a rotor and of its duct; the wash of other rotors is part of the air that comes to them."""
+    rotor, uniform = aircraft.rotors[j], memory.state[aircraft.rotors[j].inflow + S.UNIFORM]
+    mu = memory.flow[j].velocity * rotor.inverse_tip_speed
+    flow = duct_flow(rotor, uniform, mu)
+    if aircraft.switches[0].wash == 1:
+        flow = duct_flow(rotor, uniform, met_with_wash(memory, j, mu))
+    return flow
+
+
+@kernel
+def met_with_wash(memory, j, mu):
+    """Velocity of a hub relative to the air that the other rotors move, over the tip speed, hub axes."""
+    return Vector(mu.x, mu.y, mu.z - memory.wash[OTHERS, j])
+
+
+@kernel
 def set_inflow_rates(aircraft, memory, j, dx):
     """Set the inflow rates of a rotor from the sums over its blades, eqs. (6.1) and (6.2)."""
     rotor, total, x = aircraft.rotors[j], memory.totals[j], memory.state
     uniform, sine, cosine = rotor.inflow + S.UNIFORM, rotor.inflow + S.SINE, rotor.inflow + S.COSINE
-    mu = memory.flow[j].velocity * rotor.inverse_tip_speed
     scale = rotor.coefficient_scale
     moment_scale = scale / rotor.radius
     loads = Inflow(
@@ -880,13 +932,10 @@ def set_inflow_rates(aircraft, memory, j, dx):
         rounded(total.cosine_moment * moment_scale),
         rounded(total.sine_moment * moment_scale),
     )
-    if aircraft.switches[0].ducts == 1:
-        flow = disc_flow(x[uniform], sheltered(rotor.duct_turning, mu), rotor.sense)
-    else:
-        flow = disc_flow(x[uniform], mu, rotor.sense)
+    flow = flow_of_disc(aircraft, memory, j)
     states = Inflow(x[uniform], x[cosine], x[sine])
     rates = inflow_rates(rotor, states, flow, loads, aircraft.switches[0].cyclic_inflow)
     dx[uniform], dx[cosine], dx[sine] = rates.uniform, rates.cosine, rates.sine
     if aircraft.switches[0].ducts == 1:
-        ducted = rotor.inflow_speed * INVERSE_MASS * (loads.uniform - duct_flow(rotor, x[uniform], mu).rotor)
+        ducted = rotor.inflow_speed * INVERSE_MASS * (loads.uniform - flow_of_duct(aircraft, memory, j).rotor)
         dx[uniform] = select(rotor.duct > 0.0, ducted, rates.uniform)

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 LANES, VECTOR, MATRIX, INTEGER = (), (3,), (3, 3), None
 LINE = 64  # bytes of a cache line
+OTHERS, WASH_ROWS = 3, 4  # of `Work.wash`: row of the flow through the disc, and all rows
 QUAD = 4  # blades that are summed first, see `sbs_sim.lanes.memory`
 
 AIR = {"density": LANES, "gravity": LANES, "plate_areas": VECTOR}
@@ -45,6 +46,7 @@ SWITCHES = {
     "scheduled": INTEGER,  # 1 where shares in swashplate angles change with the airspeed
     "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
     "teetering": INTEGER,  # 1 where a rotor is
+    "wash": INTEGER,  # 1 where something adds to the inflow of a rotor, see `sbs_sim.model.dynamics.set_wash`
 }
 ROTOR = {
     "rotor_speed": LANES,  # Omega; 0 where a drive turns the rotor, whose speed is a state
@@ -379,6 +381,10 @@ class Work(NamedTuple):
     coning : structured ndarray, shape (quads,)
         Of an aircraft with teetering rotors, else empty, as the next.
     coning_change : ndarray, shape (n_rotors, n)
+    wash : ndarray, shape (4, n_rotors, n)
+        What others add to the inflow of each rotor, as a part of it: uniform, sine and cosine part for its blades, over
+        kappa_i Omega R, in the order of `sbs_sim.model.state.INFLOW_NAMES`; and what other rotors add to the flow
+        through its disc, over Omega R. Of an aircraft without such, empty.
     commands : ndarray, shape (3 n_rows, n)
         Swashplate angles at the present airspeed, where they change with it; else empty.
     """
@@ -403,6 +409,7 @@ class Work(NamedTuple):
     shafts: NDArray[Any]
     coning: NDArray[Any]
     coning_change: Array
+    wash: Array
     commands: Array
 
 
@@ -443,6 +450,7 @@ def make_work(model: Model) -> Work:
         shafts=records(SHAFT, len(model.drives), n),
         coning=records(CONING, quads if teetering else 0, n),
         coning_change=aligned((len(rotors) if teetering else 0, n), float),
+        wash=aligned((WASH_ROWS, len(rotors) if model.switches["wash"][0] else 0, n), float),
         commands=aligned((_command_count(model), n), float),
     )
 

@@ -12,6 +12,7 @@ from sbs_sim.lanes import (
 )
 from sbs_sim.model.dynamics import in_lanes, memory_in_lanes
 from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.records import OTHERS
 from sbs_sim.model.trigonometry import TINY, angle_of, inverse_root
 
 # columns of a rotor's row
@@ -51,7 +52,10 @@ def working_state(model, work, out):
         row[ADVANCE_RATIO] = sqrt(flow.x * flow.x + flow.y * flow.y) * scale
         row[HOVER_INFLOW] = rotor.duct_expansion * sqrt(2.0 * abs(thrust) * rotor.coefficient_scale)
         row[DESCENT] = thrust_sign * through
-        row[FLOW] = thrust_sign * (memory.state[rotor.inflow] - through)
+        flow_through = memory.state[rotor.inflow] - through
+        if aircraft.switches[0].wash == 1:
+            flow_through = flow_through + memory.wash[OTHERS, j]
+        row[FLOW] = thrust_sign * flow_through
         found, area = Vector(0.0, 0.0, 0.0), zeros_like(scale)
         for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
             own = memory.hubs[quad]

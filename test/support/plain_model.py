@@ -508,7 +508,19 @@ def flat_plate_force(ac, air_velocity):
 # ------------------------------------------------------------------------------------------------------------
 
 
-def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_inflow):
+class Wash(NamedTuple):
+    """What others add to the inflow of a rotor, as a part of it."""
+
+    blades: np.ndarray  # lambda0, lambdas, lambdac for the blades
+    through: float  # of other rotors, through the disc
+
+
+def all_washes(ac, inflow, hub_velocities):
+    """Return the `Wash` of every rotor."""
+    return [Wash(np.zeros(3), 0.0) for _ in ac.rotors]
+
+
+def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_inflow, through=0.0):
     """Return d/dt of lambda0, lambdas, lambdac [1/s], Peters and HaQuang's three states.
 
     Without cyclic inflow the equation left is momentum theory's, M00 lambda0'/Omega + V_T lambda0 / L00 =
@@ -526,6 +538,8 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
     air_velocity_hub : array, shape (3,)
         [m/s], body axes.
     cyclic_inflow : bool
+    through : float
+        What other rotors add to the flow through the disc, over the tip speed.
 
     Returns
     -------
@@ -550,7 +564,7 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
 
     met = met_velocity(rotor, air_velocity_hub)
     mu_x, mu_y = x_hub @ met / tip_speed, y_hub @ met / tip_speed
-    mu_z = -u @ air_velocity_hub / tip_speed
+    mu_z = -u @ air_velocity_hub / tip_speed - through
     lambda0 = inflow[0]
     lam = lambda0 - mu_z
     mu2 = mu_x**2 + mu_y**2
@@ -573,7 +587,8 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
     if not cyclic_inflow:
         drain[0] = v_t * lambda0 / gain[0, 0]
     if rotor.duct_exit is not None:
-        drain[0] = duct_pressures(ac, rotor, lambda0, air_velocity_hub)[0] / force_scale
+        met_by_duct = air_velocity_hub + tip_speed * through * u
+        drain[0] = duct_pressures(ac, rotor, lambda0, met_by_duct)[0] / force_scale
     rate_0, rate_c, rate_s = omega * (coefficients - drain) / mass
     return np.array([rate_0, rate_s * cyclic_inflow, rate_c * cyclic_inflow])
 
@@ -598,6 +613,7 @@ class Instant(NamedTuple):
     pitches: list  # over rotors, over blades, of pairs: pitch at the hinge [rad] and its rate [rad/s]
     state: object  # `split_state`
     hub_velocities: list  # over rotors, relative to the air, body axes [m/s]
+    washes: list  # over rotors, see `Wash`
     conings: list  # over rotors, of pairs: mean flap angle [rad] and rate [rad/s]
 
 
@@ -694,7 +710,8 @@ def fixed_exit_load(instant, j):
     """Return force [N] and moment [N m] about the origin of a duct with a fixed exit: thrust and ram drag."""
     ac, rotor = instant.ac, instant.ac.rotors[j]
     u, hub = (np.asarray(values, dtype=float) for values in (rotor.shaft_direction, rotor.hub))
-    _, thrust, mass_flow = duct_pressures(ac, rotor, instant.state.inflow[j][0], instant.hub_velocities[j])
+    met_by_duct = instant.hub_velocities[j] + inflow_speed(rotor) * rotor.radius * instant.washes[j].through * u
+    _, thrust, mass_flow = duct_pressures(ac, rotor, instant.state.inflow[j][0], met_by_duct)
     along = instant.hub_velocities[j] - u * (u @ instant.hub_velocities[j])
     drag = -mass_flow * rotor.duct_turning * along
     return thrust * u + drag, cross(hub, thrust * u) + cross(hub + rotor.lip_arm * u, drag)
@@ -857,10 +874,11 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
     blades = make_blades(ac, state, psi)
     part_force, part_moment = part_loads(ac, air_velocity, state.rate, state.inflow)
     hub_velocities = [air_velocity + cross(state.rate, np.asarray(rotor.hub, dtype=float)) for rotor in ac.rotors]
+    washes = all_washes(ac, state.inflow, hub_velocities)
     air_loads = []
     for j, rotor in enumerate(ac.rotors):
-        met = met_velocity(rotor, hub_velocities[j])
-        air_loads.append([blade_air_loads(ac, blade, swash[j], state.inflow[j], met) for blade in blades[j]])
+        met, inflow = met_velocity(rotor, hub_velocities[j]), state.inflow[j] + washes[j].blades
+        air_loads.append([blade_air_loads(ac, blade, swash[j], inflow, met) for blade in blades[j]])
     return Instant(
         ac=ac,
         lead_lag=lead_lag,
@@ -874,6 +892,7 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
         pitches=[[hinge_pitch(blade, swash[j]) for blade in own] for j, own in enumerate(blades)],
         state=state,
         hub_velocities=hub_velocities,
+        washes=washes,
         conings=[(flap[0], rate[0]) for flap, rate in zip(state.flap, state.flap_rate, strict=True)],
     )
 
@@ -938,6 +957,7 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
                 state.inflow[j],
                 instant.hub_velocities[j],
                 cyclic_inflow,
+                instant.washes[j].through,
             )
         )
         force, moment = hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd[j], lag_dd[j])

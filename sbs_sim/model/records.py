@@ -82,7 +82,6 @@ ROTOR = {
     "hub": VECTOR,
     "axes": MATRIX,  # hub axes as columns in body components
     "duct_expansion": LANES,  # a_w, of a duct with a fixed exit its exit area over that of the disc
-    "duct": LANES,  # 1 for a duct with a fixed exit
     "duct_turning": LANES,  # t
     "ram_recovery": LANES,
     "inverse_lip_stall": LANES,  # 0 where the lip never stalls
@@ -94,6 +93,7 @@ ROTOR = {
     "flap_rest": LANES,  # the coning of a teetering rotor
     "teetering": INTEGER,
     "measured_descent": INTEGER,  # 1 where the inflow in descent is that of measurements
+    "duct": INTEGER,  # 1 for a duct with a fixed exit
     "blades": INTEGER,  # N_b
     "harmonics": INTEGER,
     "first_quad": INTEGER,

@@ -73,8 +73,10 @@ class Rows(Instants[NDArray[np.int64], Array]):
     @classmethod
     def joined(cls, blocks: Sequence[Rows]) -> Rows:
         """Rows of several blocks, one after the other; without working states."""
-        names = [part.name for part in fields(cls) if part.name != "working"]
-        return cls(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
+        joined = {part.name: [getattr(block, part.name) for block in blocks] for part in fields(cls)}
+        joined["working"] = [None]
+        has_none = {name: any(column is None for column in columns) for name, columns in joined.items()}
+        return cls(**{name: None if has_none[name] else np.concatenate(joined[name]) for name in joined})
 
     def first(self, count: int) -> Rows:
         """The first instants."""

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.aircraft.model_records import ground_record
 from sbs_sim.analysis.newton import MAX_UNKNOWN
 from sbs_sim.analysis.periodic import Period, periodic
 from sbs_sim.analysis.stand import rest
@@ -95,6 +96,21 @@ def trim(
     return solve_trim(aircraft, condition, fidelity, method=method, guess=guess)
 
 
+def check_height(aircraft: Aircraft) -> None:
+    """Raise TrimError for an aircraft that would reach into the ground: trims are at the origin."""
+    if aircraft.ground.altitude is None:
+        return
+    points = [rotor.hub for rotor in aircraft.rotors]
+    points += [point.position for point in aircraft.contact_points if aircraft.has_contact]
+    down = ground_record(aircraft, 0.0)["down"][0, :, 0]
+    lowest = max(0.0, *(float(down @ point) for point in points)) / float(down[2])
+    if -aircraft.ground.altitude <= lowest:
+        raise TrimError(
+            f"ground.altitude = {aircraft.ground.altitude:g}: allowed for trims, whose aircraft is at the origin, is"
+            f" below {-lowest:g}"
+        )
+
+
 def solve_trim(
     aircraft: Aircraft,
     condition: TrimCondition,
@@ -114,6 +130,7 @@ def solve_trim(
         return rest(aircraft, condition, fidelity, _rest_guess(guess))
     if has_two_blades(aircraft):
         Period(aircraft, fidelity)  # before the search: raises where there is none
+    check_height(aircraft)
     problem = TrimProblem(substitute(aircraft), fidelity)
     start = (
         None if guess is None else _start(problem, condition, _of_substitute(aircraft, checked_guess(aircraft, guess)))

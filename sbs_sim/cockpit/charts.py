@@ -76,14 +76,20 @@ def body_charts(aircraft: Aircraft) -> tuple[Chart, ...]:
     def height(snapshot: Snapshot) -> list[float]:
         return [-float(snapshot.state[S.POSITION + 2])]
 
+    def contact(snapshot: Snapshot) -> list[float]:
+        rows = np.zeros((aircraft.layout.contacts, 3)) if snapshot.contact is None else snapshot.contact
+        return (-rows[:, 2]).tolist()
+
     units = {control.shown_unit for control in aircraft.controls}
     names = tuple(SHORT_NAMES.get(name, name.replace("_", " ")) for name in aircraft.control_names)
+    points = tuple(point.name for point in aircraft.contact_points) if aircraft.has_contact else ()
     return (
         Chart("Attitude", "deg", ("roll", "pitch", "yaw"), attitude, 2, 1.0),
         Chart("Rates", "deg/s", ("p", "q", "r"), part(S.RATES, DEGREES), 2, 1.0),
         Chart("Controls", units.pop() if len(units) == 1 else "", names, controls, 2, 1.0),
         Chart("Velocity, body axes", "m/s", ("u", "v", "w"), part(S.VELOCITY, 1.0), 2, 0.5),
         Chart("Height", "m", ("above origin",), height, 2, 0.5),
+        *([Chart("Contact with the ground, up", "N", points, contact, 1, 5.0)] if points else []),
     )
 
 

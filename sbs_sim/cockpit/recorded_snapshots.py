@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.aircraft.model_records import ground_record
 from sbs_sim.errors import RecordingError
+from sbs_sim.flight.contact import ground_forces
 from sbs_sim.flight.records import Event, Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.recording import Log, read
@@ -51,6 +53,7 @@ class RecordedSnapshots:
         self._step_size = float(log.metadata["simulation"]["step_size"])
         self.times: Array = np.asarray(flight.steps * self._step_size, dtype=np.float64)
         self.ground = _finite(log.metadata["simulation"].get("ground_altitude", ""))
+        self._model = flight.aircraft.model()._replace(ground=ground_record(flight.aircraft, self.ground))
         self._azimuths, self._loads = _rotors(log, len(self.aircraft.rotors))
         indices = np.searchsorted(log["rotors"].time, self.times - 0.5 * self._step_size)
         self._indices = np.minimum(indices, len(self._loads) - 1)
@@ -70,6 +73,7 @@ class RecordedSnapshots:
         """The last instant that was recorded before or at a time [s]; the first one before the beginning."""
         i = max(0, int(np.searchsorted(self.times, time + 0.5 * self._step_size, side="right")) - 1)
         step = int(self._flight.steps[i])
+        contact = ground_forces(self._model, self._flight.states[i : i + 1])
         return Snapshot(
             step=step,
             time=float(self.times[i]),
@@ -79,6 +83,7 @@ class RecordedSnapshots:
             azimuth=self._azimuths[self._indices[i]],
             loads=self._loads[self._indices[i]],
             wind=self._latest(step, lambda event: None if event.wind is None else np.array(event.wind.velocity)),
+            contact=None if contact is None else contact[0],
         )
 
     def _latest(self, step: int, value: Callable[[Event], Array | None]) -> Array:

@@ -368,6 +368,13 @@ def body_array(message: BodyState) -> Array:
     return np.array([*_triple(message.position), q.w, q.x, q.y, q.z, *_triple(parts[0]), *_triple(parts[1])])
 
 
+def touching_share(message: BodyState) -> float | None:
+    """Share of the contact points that touch the ground; None for an aircraft without such points."""
+    if not message.contacts:
+        return None
+    return sum(contact.depth > 0.0 for contact in message.contacts) / len(message.contacts)
+
+
 def snapshot_of(
     aircraft: Aircraft, body: BodyState, rotors: RotorStateArray, inflow: InflowArray, swashplate: Array, wind: Array
 ) -> Snapshot:

@@ -1,8 +1,9 @@
 """Node `hover_hold`: holds position and heading; an example of control design with `linearize` (docs/tutorial.md).
 
-Calls `linearize`, designs the gains and prints them. It then answers every `state` with `controls`. Subscribes `target`
-(position and heading to hold; at the start those of the aircraft), `events` for resets and `status` for pauses;
-publishes `diagnostics`.
+Calls `linearize`, designs the gains and prints them. It then answers every `state` with `controls`. Subscribes
+`target` (position and heading to hold; at the start those of the aircraft), `events` for resets and `status` for
+pauses; publishes `diagnostics`. An aircraft that stands on the ground takes off for a target above it, and lands where
+its target is on the ground or below.
 """
 
 import math
@@ -26,6 +27,7 @@ from sbs_sim.nodes.process import run
 from sbs_sim.nodes.qos import COMMAND_QOS, SERVICE_QOS
 from sbs_sim.nodes.rejections import WARNING_PERIOD, Rejections
 from sbs_sim.pilot.hover_hold import LIMITS, HoverHold, design
+from sbs_sim.pilot.landing import FLYING, Landing
 
 PARAMETERS = {
     "largest_distance": Parameter(100.0, "Targets farther from the aircraft than this are refused [m]", 0.1, 1e5),
@@ -50,7 +52,8 @@ class HoverHoldNode(PilotNode):
         model = hover_model(*self._linearized(parameters["patience"]))
         found = design(model, dict.fromkeys(("forward", "right", "down"), parameters["position_limit"]))
         print("\n".join(found.describe()), flush=True)
-        self._pilot = HoverHold(found)
+        self._pilot = Landing(HoverHold(found), model.controls, model.axes)
+        self._phase = ""
         self._rejections = Rejections(self, "target")
         self.create_subscription(PoseStamped, "target", self._on_target, COMMAND_QOS)
         self.begin()
@@ -85,9 +88,14 @@ class HoverHoldNode(PilotNode):
 
     def controls_for(self, now: float, body: NDArray[np.float64]) -> NDArray[np.float64]:
         """Answer a state with controls."""
-        if self.body is None or now < self.time:
+        is_new = self.body is None or now < self.time
+        controls = self._pilot.controls(now, body, self.touching)
+        if is_new and self._pilot.phase == FLYING:
             self.get_logger().info("holding the present position")
-        return self._pilot.controls(now, body)
+        elif self._pilot.phase != self._phase:
+            self.get_logger().info(self._pilot.phase)
+        self._phase = self._pilot.phase
+        return controls
 
     def _on_target(self, message: PoseStamped) -> None:
         try:
@@ -111,6 +119,7 @@ class HoverHoldNode(PilotNode):
             state = np.array(event.state)
             self._pilot.restart((state[: S.ATTITUDE], quaternion_to_euler(state[S.ATTITUDE : S.VELOCITY])[0]))
             self.get_logger().info("reset: holding the new position")
+            self._phase = FLYING
 
     def values(self) -> dict[str, object]:
         """Rejected targets."""

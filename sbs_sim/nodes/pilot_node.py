@@ -14,7 +14,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sbs_msgs.msg import BodyState, Controls, FlightEvent, SimulationStatus
 from sbs_sim.errors import SbsError
 from sbs_sim.nodes.component import Component
-from sbs_sim.nodes.conversions import body_array, to_seconds
+from sbs_sim.nodes.conversions import body_array, to_seconds, touching_share
 from sbs_sim.nodes.diagnostics import DIAGNOSTICS_PERIOD, diagnostic_status
 from sbs_sim.nodes.pilot_conversions import check_event, controls_message
 from sbs_sim.nodes.qos import COMMAND_QOS, EVENT_QOS, STATE_QOS
@@ -37,12 +37,15 @@ class PilotNode(Component):
         The latest state: position, attitude, velocity, rates.
     time : float
         Of the latest state [s of simulation time].
+    touching : float or None
+        Share of the contact points that touch the ground in the state that is to be answered; None without such points.
     """
 
     def begin(self) -> None:
         """Make publishers and subscriptions, once everything else is ready."""
         self.body: Array | None = None
         self.time = 0.0
+        self.touching: float | None = None
         self._arrived = time.monotonic()
         self._paused = self._stale = self._moves = False
         self._bad_states, self._bad_events = Rejections(self, "state"), Rejections(self, "events")
@@ -84,6 +87,7 @@ class PilotNode(Component):
 
     def _on_state(self, message: BodyState) -> None:
         now, body = to_seconds(message.header.stamp), body_array(message)
+        self.touching = touching_share(message)
         try:
             controls = self.controls_for(now, body)
         except SbsError as error:

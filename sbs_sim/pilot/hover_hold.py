@@ -288,6 +288,18 @@ class HoverHold:
         self._departure = np.zeros(len(S.CONTROL_NAMES))
         self._time: float | None = None
 
+    def take_over(self, target: tuple[Array, float], heading: float, controls: Array) -> None:
+        """Begin anew at a target, NED [m] and heading [rad], with the controls, shape (n_controls,), that are in force.
+
+        The integrals begin where they command these controls to an aircraft at rest at its target.
+        """
+        self.restart(target)
+        self._departure = np.clip(controls[self._axes] - self._trim[self._axes], -AUTHORITY, AUTHORITY)
+        n, held = len(MEASURED), len(HELD)
+        by_integral, by_lag = self._gains[:, n : n + held], self._gains[:, n + held :]
+        integral = -np.asarray(np.linalg.solve(by_integral, self._departure + by_lag @ self._departure), float)
+        self._integral = _turned(-heading, integral)
+
     def hold(self, position: ArrayLike, heading: float) -> None:
         """From the next state on go to a position, NED [m], shape (3,), and a heading, from north to east [rad].
 

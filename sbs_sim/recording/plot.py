@@ -235,6 +235,12 @@ def _coordinates(field: str, names: tuple[str, ...]) -> Callable[[Log], Curves]:
     return curves
 
 
+def _contact(log: Log) -> Curves:
+    """Force of the ground on every contact point against body z."""
+    points = sum(name.startswith("contacts[") and name.endswith("].force.z") for name in _topic(log, "state") or ())
+    return _fields(log, "state", {f"point {i + 1}": f"contacts[{i}].force.z" for i in range(points)}, -1.0)
+
+
 PANELS: dict[str, Callable[[Log], Curves]] = {
     "position [m]": _height,
     "velocity [m/s]": _vector("state", "velocity", "uvw"),
@@ -248,6 +254,7 @@ PANELS: dict[str, Callable[[Log], Curves]] = {
         log, "inflow", {"lambda0": "uniform", "lambdas": "sine", "lambdac": "cosine"}, 1.0
     ),
     "power [W]": lambda log: _of_rotors(log, "rotors", {"power": "power"}, 1.0),
+    "contact, up [N]": _contact,
 }
 
 

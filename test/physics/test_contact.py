@@ -254,3 +254,26 @@ def test_what_cannot_stand_is_refused(sbs):
             Aircraft.from_dict(other)
     with pytest.raises(SimulationError, match=r"ground\.contact = 'end_flight': allowed on the ground is 'contact'"):
         state_on_ground(sbs, 0.0)
+
+
+def test_undamped_lag_grows_on_the_skids():
+    """Ground resonance: the regressing lag mode takes energy from the rotation as the hub yields; dampers stop it."""
+    growth = {}
+    for damping in (0.0, 0.022):
+        data = aircraft_data(options={"elements": 6}, every_rotor={"lag_damping": damping})
+        data["ground"] = {"contact": "contact", "altitude": 0.0}
+        aircraft = Aircraft.from_dict(data)
+        start = state_on_ground(aircraft, 0.0)
+        start[S.RATES] = 0.3
+        flight = simulate(aircraft, start, STILL, 6.0, tick=0.005)
+        lag = np.hypot(flight["xic(1)"], flight["xis(1)"])
+        growth[damping] = math.log(lag[-200:].max() / lag[400:600].max()) / 4.0
+        if damping == 0.0:
+            rates = flight["p"][600:] * np.hanning(len(flight["p"]) - 600)
+            spectrum = np.abs(np.fft.rfft(rates))
+            found = 2 * math.pi * np.fft.rfftfreq(len(rates), 0.005)[spectrum.argmax()]
+            rotor = aircraft.rotors[0]
+            static = rotor.first_moment * (rotor.hinge_offset - rotor.flap_hinge_offset) / rotor.second_moment
+            assert found == pytest.approx(rotor.speed * (1.0 - math.sqrt(static)), rel=0.06), "Omega less that of lag"
+    assert growth[0.0] > 0.2
+    assert growth[0.022] < -0.2

@@ -163,9 +163,9 @@ class Period:
             x = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + rates(x + h * k3, time + h))
         return x, way, loads
 
-    def orbit(self, state: Array, swashplate: Array) -> Array:
-        """States at the instants of a motion, shape (instants, size), of that at its beginning."""
-        way = self.flown(state[np.newaxis], swashplate.reshape(1, -1), np.array([self.period]))[1][:, 0]
+    def orbit(self, state: Array, swashplate: Array, time: float | None = None) -> Array:
+        """States at the instants of a motion, shape (instants, size), of that at its beginning and its period [s]."""
+        way = self.flown(state[np.newaxis], swashplate.reshape(1, -1), np.array([time or self.period]))[1][:, 0]
         return way[:: self.steps // self._instants]
 
     def rotor_balance(self, starts: Array, ends: Array) -> Array:

@@ -234,6 +234,38 @@ def test_a_drive_makes_the_period_an_unknown(two):
     np.testing.assert_allclose(np.delete(changes, azimuth)[S.VELOCITY :], 0.0, atol=1e-4)
 
 
+def test_floquet_compares_departures_at_equal_azimuths():
+    """Columns of the monodromy matrix against flights until the shaft is where it began."""
+    aircraft = driven(GOVERNED, every_rotor=heavier(2))
+    point = trim(aircraft, 12.0)
+    found, names, count = floquet(aircraft, point, 96), point.state_names, 128
+    flown = {"tick": found.period / count, "azimuth_step": math.radians(2), "method": "rk4"}
+    cycle = simulate(aircraft, point, point.controls, found.period, **flown)["state"]
+    rate = aircraft.layout.to_linear(cycle[1]) - aircraft.layout.to_linear(cycle[count - 1])
+    rate *= count / (2 * found.period)
+    azimuth, speed = aircraft.layout.drive(0)["azimuth"], point["Omega(1)"]
+    for name, step in (("Omega(1)", 0.05), ("ad(1)", 1e-4), ("u", 1e-2)):
+        ends = []
+        for sign in (1, -1):
+            linear = point.state.copy()
+            linear[names.index(name)] += sign * step
+            start = aircraft.layout.from_linear(linear)
+            state = simulate(aircraft, start, point.controls, found.period, **flown)["state"][-1]
+            ends.append(aircraft.layout.to_linear(state) - rate * (state[azimuth] - cycle[-1][azimuth]) / speed)
+        column = (ends[0] - ends[1]) / (2 * step)
+        place = names.index(name)
+        np.testing.assert_allclose(found.monodromy[:, place], column, atol=5e-3 * np.abs(column).max())
+    assert not any(np.abs(found.multipliers - 1.0) < 1e-6)
+
+
+def test_floquet_of_rotors_with_a_drive_is_near_their_averaged_model():
+    aircraft = driven(GOVERNED, every_rotor=heavier(3))
+    found = floquet(aircraft, trim(aircraft, 5.0))
+    assert len(found.poles) == aircraft.layout.linear_size
+    slow = np.abs(found.poles) < 30.0
+    np.testing.assert_allclose(found.exponents[slow], found.poles[slow], rtol=5e-3)
+
+
 def test_rotors_on_drives_of_their_own_trim_in_the_mean():
     drives = [GOVERNED | {"rotors": [name]} for name in ("R1", "R2")]
     (said,) = trim(driven(*drives, every_rotor=heavier(2)), 5.0).warnings

@@ -393,6 +393,59 @@ def _profile(axes: Axes, pitch: float) -> None:
     axes.add_patch(Polygon(outline @ np.array([[c, s], [-s, c]]), closed=True, facecolor=PALE, edgecolor=FAINT))
 
 
+# --- offsets --------------------------------------------------------------------------------------------------------
+
+
+def offsets() -> Figure:
+    """A swept blade from above, and one of its sections from the tip for G = +1."""
+    figure = Figure(figsize=(9.2, 3.5), facecolor="white")
+    above = panel(figure, (0.0, 0.0, 0.56, 0.88), (-0.5, 7.6), (-1.9, 2.0), "from above")
+    _swept_blade(above)
+    across = panel(figure, (0.58, 0.0, 0.42, 0.88), (-2.0, 2.2), (-1.35, 1.75), "a section from the tip")
+    pitch = 25.0
+    _profile(across, pitch)
+    forward = unit(pitch)
+    axis = along((0, 0), forward, -0.34)
+    line(across, [(axis[0] - 1.2, axis[1]), (axis[0] + 2.0, axis[1])], FAINT, 0.8, "--")
+    line(across, [along(axis, forward, -1.2), along(axis, forward, 1.8)], INK, 0.8, "--")
+    across.plot(*axis, "o", color=INK, markersize=4)
+    quarter, centre = along((0, 0), forward, 0.085), along(axis, forward, -0.3)
+    across.plot(*quarter, "o", color=BLUE, markersize=5)
+    across.plot(*centre, "s", color=RED, markersize=5)
+    note(across, (axis[0] + 0.1, axis[1] - 0.26), r"$\mathbf{d}$, pitch axis", INK, 9, "left")
+    arrow(across, quarter, along(quarter, unit(95), 0.85), "lift", (0.0, 0.14), BLUE)
+    note(across, (quarter[0] + 0.75, quarter[1] - 0.02), "$x_c > 0$", BLUE, 11)
+    note(across, (centre[0] - 0.35, centre[1] + 0.3), "$x_m < 0$", RED, 11)
+    angle(across, axis, 1.6, 0, pitch, r"$\vartheta$", INK, 1.12)
+    arrow(across, (-1.7, 0.7), (-1.7, 1.4), r"$\mathbf{n}$", (0.15, 0.0), width=1.0)
+    arrow(across, (-1.7, 0.7), (-1.0, 0.7), r"$\mathbf{t}$", (0.08, 0.16), width=1.0)
+    return figure
+
+
+def _swept_blade(axes: Axes) -> None:
+    """Hinges at the left, the blade to the right, its motion upwards; the tip is swept."""
+    chord, inner, outer, tip, back = 1.0, 1.0, 5.2, 6.6, -0.75
+    nose, tail = 0.42, 0.42 - chord
+    shape = [(inner, nose), (outer, nose), (tip, nose + back), (tip, tail + back), (outer, tail), (inner, tail)]
+    axes.add_patch(Polygon(shape, closed=True, facecolor=PALE, edgecolor=FAINT))
+    line(axes, [(-0.3, 0), (7.3, 0)], INK, 0.9, "-.")
+    note(axes, (-0.3, 0.2), "pitch axis", INK, 9, "left")
+    quarter = nose - 0.25 * chord
+    line(axes, [(inner, quarter), (outer, quarter), (tip, quarter + back)], BLUE, 1.6)
+    line(axes, [(inner, -0.1), (outer, -0.1), (tip, -0.1 + 0.9 * back)], RED, 1.2, "--")
+    note(axes, (2.9, 0.75), "quarter chords, $x_c(s)$", BLUE, 10)
+    note(axes, (2.9, -0.9), "centres of gravity, $x_m(s)$", RED, 10)
+    start = (outer, quarter)
+    line(axes, [start, (tip + 0.6, quarter)], FAINT, 0.8, ":")
+    sweep = math.degrees(math.atan2(back, tip - outer))
+    angle(axes, start, 1.5, 0, sweep, r"$\Lambda$", BLUE, 1.14)
+    arrow(axes, (0.3, 0.7), (0.3, 1.6), r"$\mathbf{t}$", (0.2, 0.0), width=1.0)
+    arrow(axes, (0.3, 0.7), (1.2, 0.7), r"$\mathbf{d}$", (0.15, 0.15), width=1.0)
+    across = unit(sweep + 90)
+    middle = ((outer + tip) / 2, quarter + back / 2)
+    arrow(axes, middle, along(middle, across, 1.15), r"$u_\nu$", (0.22, 0.08), BLUE)
+
+
 # --- inflow ---------------------------------------------------------------------------------------------------------
 
 
@@ -615,6 +668,7 @@ FIGURES = {
     "azimuth": azimuth,
     "hinges": hinges,
     "section": section,
+    "offsets": offsets,
     "inflow": inflow,
     "mass_matrix": mass_matrix,
     "trim": trim_flow,

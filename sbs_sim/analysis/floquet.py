@@ -21,6 +21,7 @@ from sbs_sim.content import ByContent
 from sbs_sim.errors import LinearizationError
 from sbs_sim.flight.trim_point import Fidelity, TrimPoint
 from sbs_sim.flight.two_blades import has_two_blades
+from sbs_sim.model import state as S
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -65,12 +66,10 @@ def checked_period(aircraft: Aircraft) -> tuple[float, list[int]]:
     Raises
     ------
     LinearizationError
-        A stand, drives, or rotors whose blade passages have no common period.
+        A stand, drives that do not join all rotors, or rotors whose blade passages have no common period.
     """
     if aircraft.body.is_stand:
         raise LinearizationError("body.stand: allowed is none; IsolatedRotor.exponents has those of a rotor on a stand")
-    if aircraft.drives:
-        raise LinearizationError("drives: allowed are rotors of constant speed, of which the period is known")
     return common_period(aircraft)
 
 
@@ -92,17 +91,22 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
     Raises
     ------
     LinearizationError
-        A count out of range, rotors whose blade passages have no common period, or a stand.
+        A count out of range, rotors whose blade passages have no common period, drives that do not join all rotors, or
+        a stand.
     """
     period, _ = checked_period(aircraft)
+    period *= aircraft.rotors[0].speed / float(point.rotor_speed[0])
     least, most = AZIMUTH_COUNTS
     if not least <= azimuth_count <= most or azimuth_count % 2:
         raise LinearizationError(f"azimuth_count = {azimuth_count}: allowed are even numbers from {least} to {most}")
     times = period * np.arange(azimuth_count) / azimuth_count
-    psi = times[:, None] * np.array([rotor.speed for rotor in aircraft.rotors])
+    psi, states = times[:, None] * point.rotor_speed, None
     used = np.array([i for i in used_states(point) if point.state_names[i] not in aircraft.locked_names])
-    states = _orbit(aircraft, point, azimuth_count) if has_two_blades(aircraft) else None
+    if has_two_blades(aircraft):
+        psi, states = _orbit(aircraft, point, psi, period)
     a = jacobians(aircraft, point, psi, difference_steps(aircraft), states)[:, used][:, :, used]
+    if aircraft.drives and states is not None:
+        a = _at_equal_azimuths(aircraft, a, states[:, used], [point.state_names[i] for i in used], period)
     monodromy = transition(a, period)
     multipliers = np.linalg.eigvals(monodromy).astype(complex)
     poles = np.linalg.eigvals(a.mean(axis=0)).astype(complex)
@@ -111,11 +115,31 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
     return Floquet(period, monodromy, multipliers, exponents, poles)
 
 
-def _orbit(aircraft: Aircraft, point: TrimPoint, count: int) -> Array:
-    """Linear states of the periodic flight of two blades, shape (count, linear_size)."""
-    period = Period(aircraft, Fidelity(point.lead_lag, point.cyclic_inflow), instants=count)
-    way = period.orbit(aircraft.layout.from_linear(point.state), point.swashplate)
-    return np.array([aircraft.layout.to_linear(state) for state in way])
+def _orbit(aircraft: Aircraft, point: TrimPoint, psi: Array, time: float) -> tuple[Array, Array]:
+    """Azimuths (count, n_rotors) and linear states (count, linear_size) of the periodic flight of two blades.
+
+    `psi` are the azimuths at constant speed, `time` is the period [s].
+    """
+    period = Period(aircraft, Fidelity(point.lead_lag, point.cyclic_inflow), instants=len(psi))
+    way = period.orbit(aircraft.layout.from_linear(point.state), point.swashplate, time)
+    if aircraft.drives:
+        psi = np.array([aircraft.turned(np.zeros(len(aircraft.rotors)), state) for state in way])
+    return psi, np.array([aircraft.layout.to_linear(state) for state in way])
+
+
+def _at_equal_azimuths(aircraft: Aircraft, a: Array, states: Array, names: list[str], period: float) -> Array:
+    """Matrices, shape (m, n, n), of departures compared at equal azimuths of the drive (theory.md section 9.7).
+
+    A departure that turns faster is ahead on the periodic motion. The rates of that follow from its states by Fourier's
+    series.
+    """
+    count, speed = len(states), names.index(f"{S.SPEED}(1)")
+    order = 2j * math.pi / period * np.fft.fftfreq(count, 1.0 / count)
+    order[count // 2] = 0.0
+    rates = np.fft.ifft(np.fft.fft(states, axis=0) * order[:, np.newaxis], axis=0).real
+    changed = a.copy()
+    changed[:, :, speed] -= rates / states[:, speed, np.newaxis]
+    return changed
 
 
 def transition(a: Array, period: float) -> Array:

@@ -15,7 +15,7 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.floquet import transition
 from sbs_sim.analysis.newton import newton
-from sbs_sim.analysis.periodic import Period, solved
+from sbs_sim.analysis.periodic import DEFLECTIONS, Period, Standing
 from sbs_sim.content import ByContent
 from sbs_sim.errors import TrimError
 from sbs_sim.flight.engine import Engine, points_engine
@@ -34,8 +34,6 @@ ComplexArray = NDArray[np.complex128]
 ANGLE_STEP, RATE_STEP = 1e-5, 1e-3  # of the differences: rad or inflow ratio, rad/s
 MIN_INSTANTS = 8
 START_INFLOW = 0.02  # of the tip speed
-# in the state, along and about x, y, z: position, and the vector part of the attitude, half the angle
-DEFLECTIONS = np.array([S.POSITION, S.POSITION + 1, S.POSITION + 2, S.ATTITUDE + 1, S.ATTITUDE + 2, S.ATTITUDE + 3])
 LIMITS = {"airspeed": (-400.0, 400.0, "m/s"), "climb_rate": (-400.0, 400.0, "m/s"), "pitch": (-1.5, 1.5, "rad")}
 
 
@@ -90,8 +88,7 @@ class IsolatedRotor:
     Raises
     ------
     TrimError
-        The aircraft has several rotors, an engine, or a schedule of its swashplate; or a rotor with two blades that
-        turns freely, or on a stand that gives way.
+        The aircraft has several rotors, an engine, or a schedule of its swashplate.
     """
 
     def __init__(self, aircraft: Aircraft, fidelity: Fidelity | None = None) -> None:
@@ -112,8 +109,6 @@ class IsolatedRotor:
         self._free = np.flatnonzero(aircraft.body.stand_free) if aircraft.body.is_stand else np.zeros(0, dtype=np.int64)
         # of two blades, which have no constant coordinates
         self._mean_rotor = IsolatedRotor(substitute(aircraft), self.fidelity) if has_two_blades(aircraft) else None
-        if self._mean_rotor is not None and (len(self._free) or self.is_driven):
-            raise TrimError(f"{self.rotor.name} has 2 blades: allowed for them is a hub that is held, at a given speed")
         self._azimuths = azimuths(aircraft.passages, self.fidelity.azimuth_count)
         self.places, self.rate_places = self._unknowns()
         is_inflow, is_speed = self._is_inflow(self.rate_places), self.rate_places >= self.layout.drives_start
@@ -189,33 +184,28 @@ class IsolatedRotor:
         self, mean_rotor: IsolatedRotor, swashplate: Sequence[float], given: dict[str, float], start: RotorPoint | None
     ) -> RotorPoint:
         """Periodic motion of two blades near the steady motion of their substitute."""
-        speeds = np.array([self.rotor.speed])
+        speeds = self.aircraft.rotor_speeds(self._flight(0.0, 0.0, 0.0) if start is None else start.state)
         if start is not None:
             start = replace(start, state=of_substitute(self.aircraft, start.state, speeds), places=mean_rotor.places)
         found = mean_rotor.steady(swashplate, **given, start=start)
-        begin = at_azimuths(self.aircraft, found.state, np.zeros((1, 1)), speeds)[0]
-        period, commands = Period(self.aircraft, self.fidelity, _held), self._commands(found.swashplate)
+        begin = at_azimuths(self.aircraft, found.state, np.zeros((1, 1)), np.array([found.speed]))[0]
+        period, commands = self._period(), self._commands(found.swashplate)
+        motion = Standing(self.aircraft, period, begin, commands)
+        x, time, residual = motion.solved(self.rotor.name)
+        motion.check(x, time)
+        loads = period.flown(x[np.newaxis], commands[np.newaxis], np.array([time]))[2][0, 0]
+        return replace(self._result(x, found.swashplate, loads, residual), speed=float(period.mean_speeds(time)[0]))
 
-        def states(values: Array) -> Array:
-            made = np.repeat(begin[np.newaxis], len(values), axis=0)
-            made[:, period.places] += values * period.scales
-            return made
-
-        def residuals(values: Array) -> Array:
-            starts = states(values)
-            return period.rotor_balance(starts, period.ends(starts, np.repeat([commands], len(values), axis=0)))
-
-        values = solved(residuals, len(period.places), self.rotor.name)[np.newaxis]
-        x = states(values)[0]
-        loads = period.flown(x[np.newaxis], commands[np.newaxis])[2][0, 0]
-        return self._result(x, found.swashplate, loads, float(np.abs(residuals(values)).max()))
+    def _period(self, instants: int = 1) -> Period:
+        """A revolution of two blades; a stand or a drive lets the hub or the speed follow the loads."""
+        gives_way = self.is_driven or len(self._free) > 0
+        return Period(self.aircraft, self.fidelity, None if gives_way else _held, instants)
 
     def _along(self, point: RotorPoint, psi: Array) -> list[Array]:
         """States of a steady motion at equal steps of the azimuth over a revolution, shape (m, 1)."""
         if self._mean_rotor is None:
             return [point.state] * len(psi)
-        period = Period(self.aircraft, self.fidelity, _held, len(psi))
-        return list(period.orbit(point.state, self._commands(point.swashplate)))
+        return list(self._period(len(psi)).orbit(point.state, self._commands(point.swashplate)))
 
     def _flight(self, airspeed: float, climb_rate: float, pitch: float) -> Array:
         """State of the hub with the rotor's states where the search begins."""

@@ -7,6 +7,7 @@ nested loops are there to compare with.
 from __future__ import annotations  # `help` then shows types by their names
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,13 +16,13 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.model_records import ground_record
 from sbs_sim.analysis.newton import MAX_UNKNOWN
-from sbs_sim.analysis.periodic import Period, periodic
+from sbs_sim.analysis.periodic import common_period, periodic, periodic_rest
 from sbs_sim.analysis.stand import rest
 from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import UNEQUAL_BLADES, TrimProblem
 from sbs_sim.analysis.trim_search import find
 from sbs_sim.analysis.two_loop import solve_by_two_loops
-from sbs_sim.errors import TrimError
+from sbs_sim.errors import LinearizationError, TrimError
 from sbs_sim.flight.trim_point import Fidelity, StandPoint, TrimCondition, TrimPoint
 from sbs_sim.flight.two_blades import (
     has_two_blades,
@@ -37,6 +38,7 @@ Array = NDArray[np.float64]
 Guess = TrimPoint | ArrayLike | tuple[ArrayLike, ArrayLike]
 
 METHODS = ("newton", "two_loop")
+MEAN_ONLY = "this is the mean flight of three lighter blades in place of two"
 
 
 def trim(
@@ -86,9 +88,8 @@ def trim(
     Raises
     ------
     TrimError
-        A value out of range; two blades on a stand, with drives, or with rotors of no common period; or no solution:
-        the message says what stops it (rotors that cannot carry the weight, a rotor that stalls, a control beyond its
-        range), and with the attributes which equation is left with what.
+        A value out of range, or no solution: the message says what stops it (rotors that cannot carry the weight, a
+        rotor that stalls, a control beyond its range), and with the attributes which equation is left with what.
     """
     checks.instance("aircraft", aircraft, Aircraft, TrimError)
     condition = TrimCondition(airspeed, climb_rate, sideslip, turn_rate)
@@ -124,12 +125,8 @@ def solve_trim(
     checks.choice("method", method, METHODS, TrimError)
     if method == "two_loop" and (aircraft.drives or aircraft.body.is_stand):
         raise TrimError(f"method = 'two_loop': allowed {'with drives' if aircraft.drives else 'on a stand'} is newton")
-    if aircraft.body.is_stand and has_two_blades(aircraft):
-        raise TrimError("body.stand: allowed with two blades is none; IsolatedRotor holds the hub of a rotor")
     if aircraft.body.is_stand:
-        return rest(aircraft, condition, fidelity, _rest_guess(guess))
-    if has_two_blades(aircraft):
-        Period(aircraft, fidelity)  # before the search: raises where there is none
+        return _rest(aircraft, condition, fidelity, _rest_guess(guess))
     check_height(aircraft)
     problem = TrimProblem(substitute(aircraft), fidelity)
     start = (
@@ -143,13 +140,31 @@ def solve_trim(
     return _own(aircraft, problem.point(condition, unknowns, method, iterations))
 
 
+def _rest(aircraft: Aircraft, condition: TrimCondition, fidelity: Fidelity, guess: StandPoint | None) -> StandPoint:
+    """Rest on a stand; with two blades the periodic motion near that of the substitute."""
+    if not has_two_blades(aircraft):
+        return rest(aircraft, condition, fidelity, guess)
+    if guess is not None:
+        guess = cast(StandPoint, trim_of_substitute(aircraft, guess))
+    return cast(StandPoint, _own(aircraft, rest(substitute(aircraft), condition, fidelity, guess)))
+
+
 def _own(aircraft: Aircraft, point: TrimPoint) -> TrimPoint:
-    """Trim of an aircraft, of that of its substitute; with two blades the periodic flight near it."""
+    """Trim of an aircraft, of that of its substitute; with two blades the periodic motion near it, if there is one."""
     if not has_two_blades(aircraft):
         return point
-    unequal = [rotor for rotor in aircraft.rotors if rotor.blades == 2 and not rotor.has_equal_blades]
-    point = replace(point, warnings=(*point.warnings, *(f"{rotor.name}: {UNEQUAL_BLADES}" for rotor in unequal)))
-    return periodic(aircraft, with_two_blades(aircraft, point))
+    warned = [
+        f"{rotor.name}: {UNEQUAL_BLADES}"
+        for rotor in aircraft.rotors
+        if rotor.blades == 2 and not rotor.has_equal_blades
+    ]
+    point = with_two_blades(aircraft, point)
+    try:
+        common_period(aircraft)
+    except LinearizationError as error:
+        return replace(point, warnings=(*point.warnings, *warned, f"two blades: {error}; {MEAN_ONLY}"))
+    point = replace(point, warnings=(*point.warnings, *warned))
+    return periodic_rest(aircraft, point) if isinstance(point, StandPoint) else periodic(aircraft, point)
 
 
 def _of_substitute(

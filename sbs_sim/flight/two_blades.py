@@ -59,6 +59,8 @@ def _lighter(rotor: Rotor) -> Rotor:
     values |= {name: damping * values[name] for name in ("lag_damping", "damper_damping")}
     if rotor.blade_inertia is not None:
         values["blade_inertia"] = SHARE * rotor.blade_inertia
+    if rotor.mass_values is not None:
+        values |= {"mass_values": SHARE * rotor.mass_values, "tip_mass": SHARE * rotor.tip_mass}
     return _Substitute(**{**values, "blades": SUBSTITUTES, "blade_lag_damping": None})
 
 

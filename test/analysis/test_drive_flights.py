@@ -8,7 +8,6 @@ import pytest
 from helpers import aircraft_data
 
 from sbs_sim import Aircraft, EngineFailure, Simulation, linearize, simulate, trim
-from sbs_sim.analysis.floquet import floquet
 from sbs_sim.errors import LinearizationError, SimulationError, TrimError
 from sbs_sim.flight.trimmed_state import trimmed_state
 
@@ -198,8 +197,6 @@ def test_what_is_not_possible_is_refused(governed):
         trim(aircraft, method="two_loop")
     with pytest.raises(LinearizationError, match="paper"):
         linearize(aircraft, point=point, method="paper")
-    with pytest.raises(LinearizationError, match="drives"):
-        floquet(aircraft, point)
     with pytest.raises(SimulationError, match="engine of drive 2: allowed are 1"):
         simulate(aircraft, point, point.controls, 0.1, method="rk4", events=[EngineFailure(0.0, 2)])
     with pytest.raises(SimulationError, match="share = 2"):

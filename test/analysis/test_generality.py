@@ -46,6 +46,9 @@ def test_the_sample_has_every_key():
             "swashplate_offset_deg",
             "lip_arm",
             "induced_power_factor",
+            "quarter_chord",
+            "chordwise_cg",
+            "lag_stop",
         ),
     ):
         assert any(key in text for text in texts), key

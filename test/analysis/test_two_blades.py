@@ -11,6 +11,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.floquet import floquet
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
 from sbs_sim.analysis.linearize import trim_effects
+from sbs_sim.analysis.periodic import common_period
 from sbs_sim.errors import AircraftError, LinearizationError, TrimError
 from sbs_sim.flight.trim_point import Fidelity
 from sbs_sim.flight.trimmed_state import trimmed_state
@@ -149,6 +150,23 @@ def test_the_substitute_has_the_same_loads(two, cruise):
     assert trim_of_substitute(two, cruise).state_names == mean.state_names
 
 
+def test_the_substitute_has_the_offsets_and_their_mass():
+    """Mean loads of a rotor alone, underslung, with a table of mass: of two blades and of their substitute."""
+    table = {"stations": [0.1, 0.6, 1.0], "values": [0.5, 0.4, 0.3], "tip_mass": 0.01}
+    offsets = {"quarter_chord": {"root": 0.004, "tip": -0.01}, "chordwise_cg": {"root": 0.006, "tip": 0.002}}
+    data = aircraft_data(rotors=[teetering(undersling=0.01, **offsets)])
+    rotor = {key: value for key, value in data["rotors"][0].items() if key not in ("blade_mass", "blade_cg")}
+    data["rotors"] = [rotor | {"mass_distribution": table}]
+    aircraft = Aircraft.from_dict(data)
+    np.testing.assert_allclose(substitute(aircraft).fuselage()[1], aircraft.fuselage()[1], atol=1e-12)
+    np.testing.assert_allclose(substitute(aircraft).fuselage()[2], aircraft.fuselage()[2], atol=1e-12)
+    fidelity = Fidelity(lead_lag=False, cyclic_inflow=False)
+    two, three = (IsolatedRotor(craft, fidelity) for craft in (aircraft, substitute(aircraft)))
+    two, three = (rotor.steady((0.12, 0.01, 0.02), 10.0) for rotor in (two, three))
+    assert two.thrust == pytest.approx(three.thrust, rel=2e-3)
+    np.testing.assert_allclose(two.force, three.force, atol=3e-3 * three.thrust)
+
+
 def test_rotors_of_two_and_more_blades_and_speeds():
     """A common period of three revolutions of the first rotor, which is two of the other."""
     rotors = [
@@ -157,8 +175,18 @@ def test_rotors_of_two_and_more_blades_and_speeds():
     ]
     point = trim(build(rotors=rotors), 5.0, lead_lag=False)
     assert point.residual < 1e-9
-    with pytest.raises(TrimError, match=r"rotors with two blades: the blade passages .* have no common period"):
-        trim(build(rotors=[heavier(2), {"speed_rpm": 2400.1}]))
+    with pytest.raises(LinearizationError, match=r"the blade passages of the rotors have no common period"):
+        common_period(build(rotors=[heavier(2), {"speed_rpm": 2400.1}]))
+
+
+def test_without_a_common_period_a_trim_is_the_mean_flight():
+    """It says so, and is that of nearly the same speed, whose flight repeats."""
+    mean, exact = (trim(build(rotors=[heavier(2), {"speed_rpm": speed}]), 5.0) for speed in (2400.1, 2400.0))
+    (said,) = mean.warnings
+    assert said.startswith("two blades: the blade passages of the rotors have no common period")
+    assert exact.warnings == ()
+    np.testing.assert_allclose(mean.power, exact.power, rtol=5e-3)
+    np.testing.assert_allclose(mean.controls, exact.controls, atol=math.radians(0.1))
 
 
 def test_there_is_no_constant_model(two, cruise):
@@ -178,16 +206,115 @@ def test_what_a_rotor_alone_with_two_blades_has_not():
     point = isolated.steady((0.1, 0.0, 0.0))
     with pytest.raises(TrimError, match=r"R1 has 2 blades: no constant matrix describes them"):
         isolated.matrix(point)
-    stand = {"free": ["x"], "mass": [9.0, 0, 0, 0, 0, 0], "spring": [1e4, 0, 0, 0, 0, 0]}
-    with pytest.raises(TrimError, match="R1 has 2 blades: allowed for them is a hub that is held, at a given speed"):
-        IsolatedRotor(build(rotors=[heavier(2)], body={"stand": stand}))
 
 
-def test_drives_are_refused_in_trims():
-    drive = {"rotors": ["R1", "R2"], "inertia": 0.01}
-    data = aircraft_data(every_rotor=heavier(2)) | {"drives": [drive]}
-    with pytest.raises(TrimError, match="drives: allowed with two blades are none"):
-        trim(Aircraft.from_dict(data))
+GOVERNED = {
+    "rotors": ["R1", "R2"],
+    "inertia": 0.02,
+    "engine": {"kind": "engine", "max_torque": 20.0, "lag": 0.1, "throttle": 0.3},
+    "governor": {"proportional_gain": 3.0, "integral_gain": 3.0},
+}
+
+
+def driven(*drives, **changes):
+    return Aircraft.from_dict(aircraft_data(**changes) | {"drives": list(drives)})
+
+
+def test_a_drive_makes_the_period_an_unknown(two):
+    """The governor holds the mean speed, and a heavy transmission keeps it within a revolution: the flight repeats."""
+    point = trim(driven(GOVERNED, every_rotor=heavier(2)), 12.0)
+    np.testing.assert_allclose(point.rotor_speed, two.rotors[0].speed, rtol=1e-4)
+    np.testing.assert_allclose(point.power, trim(two, 12.0).power, rtol=1e-5)
+    period = 2 * math.pi / point.rotor_speed[0]
+    aircraft = driven(GOVERNED, every_rotor=heavier(2))
+    flight = simulate(aircraft, point, point.controls, 20 * period, tick=period, azimuth_step=math.radians(4))
+    changes = flight["state"][-1] - flight["state"][0]
+    azimuth = aircraft.layout.drive(0)["azimuth"]
+    assert changes[azimuth] == pytest.approx(20 * 2 * math.pi, rel=1e-8)
+    np.testing.assert_allclose(np.delete(changes, azimuth)[S.VELOCITY :], 0.0, atol=1e-4)
+
+
+def test_floquet_compares_departures_at_equal_azimuths():
+    """Columns of the monodromy matrix against flights until the shaft is where it began."""
+    aircraft = driven(GOVERNED, every_rotor=heavier(2))
+    point = trim(aircraft, 12.0)
+    found, names, count = floquet(aircraft, point, 96), point.state_names, 128
+    flown = {"tick": found.period / count, "azimuth_step": math.radians(2), "method": "rk4"}
+    cycle = simulate(aircraft, point, point.controls, found.period, **flown)["state"]
+    rate = aircraft.layout.to_linear(cycle[1]) - aircraft.layout.to_linear(cycle[count - 1])
+    rate *= count / (2 * found.period)
+    azimuth, speed = aircraft.layout.drive(0)["azimuth"], point["Omega(1)"]
+    for name, step in (("Omega(1)", 0.05), ("ad(1)", 1e-4), ("u", 1e-2)):
+        ends = []
+        for sign in (1, -1):
+            linear = point.state.copy()
+            linear[names.index(name)] += sign * step
+            start = aircraft.layout.from_linear(linear)
+            state = simulate(aircraft, start, point.controls, found.period, **flown)["state"][-1]
+            ends.append(aircraft.layout.to_linear(state) - rate * (state[azimuth] - cycle[-1][azimuth]) / speed)
+        column = (ends[0] - ends[1]) / (2 * step)
+        place = names.index(name)
+        np.testing.assert_allclose(found.monodromy[:, place], column, atol=5e-3 * np.abs(column).max())
+    assert not any(np.abs(found.multipliers - 1.0) < 1e-6)
+
+
+def test_floquet_of_rotors_with_a_drive_is_near_their_averaged_model():
+    aircraft = driven(GOVERNED, every_rotor=heavier(3))
+    found = floquet(aircraft, trim(aircraft, 5.0))
+    assert len(found.poles) == aircraft.layout.linear_size
+    slow = np.abs(found.poles) < 30.0
+    np.testing.assert_allclose(found.exponents[slow], found.poles[slow], rtol=5e-3)
+
+
+def test_rotors_on_drives_of_their_own_trim_in_the_mean():
+    drives = [GOVERNED | {"rotors": [name]} for name in ("R1", "R2")]
+    (said,) = trim(driven(*drives, every_rotor=heavier(2)), 5.0).warnings
+    assert said.startswith("two blades: rotors whose speeds are their own have no common period")
+
+
+def test_two_blades_autorotate_as_four():
+    """Without cyclic inflow the speed at which no torque is left does not know of the number of blades."""
+    found = []
+    for blades in (2, 4):
+        aircraft = driven({"rotors": ["R1"], "inertia": 0.5}, rotors=[heavier(blades, airfoil="thin_2pi")])
+        isolated = IsolatedRotor(aircraft, Fidelity(lead_lag=False, cyclic_inflow=False))
+        found.append(isolated.steady((0.03, 0.0, 0.0), 6.0, -8.0))
+    assert abs(found[0].torque) < 1e-4
+    assert found[0].speed == pytest.approx(found[1].speed, rel=2e-3)
+    assert found[0].thrust == pytest.approx(found[1].thrust, rel=5e-3)
+
+
+SPRUNG = {"free": ["x", "y", "roll"], "mass": [9.0, 9.0, 0.0, 1.0, 0.0, 0.0]}
+SPRUNG |= {"spring": [9e4, 9e4, 0.0, 9e3, 0.0, 0.0], "damping": [200.0, 200.0, 0.0, 20.0, 0.0, 0.0]}
+
+
+def test_two_blades_on_a_stand_that_gives_way():
+    """The trim is a motion that repeats, its deflection that of the mean load on the springs."""
+    data = aircraft_data(rotors=[heavier(2)], body={"stand": SPRUNG})
+    for name, angle in (("collective", 8.0), ("longitudinal_cyclic", 2.0), ("lateral_cyclic", 1.0)):
+        data["controls"][name]["held_deg"] = angle
+    aircraft = Aircraft.from_dict(data)
+    point = trim(aircraft)
+    period = math.pi * 2 / aircraft.rotors[0].speed
+    flight = simulate(aircraft, point, point.controls, 10 * period, tick=period / 64, azimuth_step=math.radians(3))
+    states = flight["state"]
+    np.testing.assert_allclose(states[-1], states[0], atol=2e-5)
+    place, load = states[-65:-1, S.POSITION + 1].mean(), IsolatedRotor(aircraft).steady(point.swashplate[0]).force[1]
+    assert place == pytest.approx(load / 9e4, rel=2e-2)
+    assert np.abs(states[-65:, S.POSITION + 1]).max() > 1e-6
+
+
+def test_a_stand_resonates_with_two_blades_as_with_three():
+    """Exponents of both rotors: modes of the stand, but for what its loads of two per revolution couple."""
+    stand = {"free": ["x", "y"], "mass": [9.0, 9.0, 0, 0, 0, 0], "spring": [9e4, 9e4, 0, 0, 0, 0]}
+    stand["damping"] = [20.0, 20.0, 0, 0, 0, 0]
+    found = []
+    for blades in (2, 3):
+        rotor = IsolatedRotor(build(rotors=[heavier(blades)], body={"stand": stand}))
+        exponents = rotor.exponents(rotor.steady((0.1, 0.01, 0.02)), 96)
+        found.append(exponents[exponents.imag > 0.0][:2])
+    np.testing.assert_allclose(found[0].real, found[1].real, rtol=0.05)
+    np.testing.assert_allclose(found[0].imag, found[1].imag, rtol=0.05)
 
 
 def test_a_damper_may_be_missing(two):

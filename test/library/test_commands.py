@@ -149,7 +149,7 @@ def test_trim_of_a_file_with_unequal_rotors():
 def test_an_aircraft_without_a_period_is_refused_before_the_work():
     refused = call("linearize", "--aircraft", "quadrotor", "--floquet")
     assert (refused.returncode, refused.stdout) == (1, "")
-    assert refused.stderr == "drives: allowed are rotors of constant speed, of which the period is known\n"
+    assert refused.stderr == "rotors whose speeds are their own have no common period\n"
 
 
 def test_linearize_prints_modes(sbs, tmp_path):

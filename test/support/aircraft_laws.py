@@ -78,7 +78,7 @@ def balance_errors(aircraft, number):
     errors = {}
     for where, one, blown in (("air", model, wind), ("vacuum", Model(Aircraft.from_dict(empty)), 0.0 * wind)):
         rates = one.derivative(x, swash, psi, blown)
-        p, h, energy = rates_of_totals(one.aircraft, x, rates, psi)
+        p, h, energy = rates_of_totals(one.aircraft, x, rates, psi, swash)
         found = balance(one, x, swash, psi, blown)
         weight = aircraft.body.mass * aircraft.environment.gravity
         powers = [found.body, found.drag, found.flow, found.dampers, found.engines]

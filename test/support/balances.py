@@ -14,10 +14,13 @@ from plain_model import (
     duct_load,
     energy,
     first_moment,
+    has_offsets,
+    lag_stop_moment,
     make_instant,
     met_velocity,
     momentum,
     rotation_matrix,
+    span_of,
 )
 
 from sbs_sim.model import records as R
@@ -144,27 +147,29 @@ def balance(model, x, swash, psi0, wind=(0.0, 0.0, 0.0)):
         dampers -= motion @ (plain.body.stand_damping * motion)
     weight = np.array([0.0, 0.0, plain.environment.gravity])
     p = attitude @ force
-    h = cross(state.position, p) + attitude @ moment + cross(first_moment(plain, x[:size], psi), weight)
+    h = cross(state.position, p) + attitude @ moment + cross(first_moment(plain, x[:size], psi, swash), weight)
     engines = engine_power(aircraft, x, model.loads[:, R.TORQUE])
     return Balance(p + plain.body.mass * weight, h, body, drag, flow, dampers, engines)
 
 
 def induced_velocity(rotor, blade, s, inflow):
-    """Return the induced velocity at the station s of a blade as its sections see it, along the normal [m/s]."""
+    """Return the induced velocity at the station s of a blade as its sections see it [m/s]."""
     lambda0, lambdas, lambdac = inflow
     cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
-    share = (rotor.hinge_offset + s) / rotor.radius
+    share = (rotor.hinge_offset + span_of(s)) / rotor.radius
     speed = rotor.induced_power_factor * rotor.inflow_speed
-    return speed * rotor.radius * (lambda0 + share * cyclic) * np.cos(blade.flap) * blade.n
+    along = blade.u if has_offsets(rotor) else np.cos(blade.flap) * blade.n  # sweep sees the flow along the span
+    return speed * rotor.radius * (lambda0 + share * cyclic) * along
 
 
 def damping_power(instant, j, k):
-    """Return the power that the dampers of a blade give to its flap and lag [W]."""
+    """Return the power that the dampers of a blade, and its lag stops, give to its flap and lag [W]."""
     rotor, blade = instant.ac.rotors[j], instant.blades[j][k]
     flap, lag = damper_moments(rotor, blade, instant.pitches[j][k])
     factor = 1.0 if rotor.blade_lag_damping is None else rotor.blade_lag_damping[k]
     lag_power = (lag - rotor.lag_damping * blade.lag_rate) * blade.lag_rate if instant.lead_lag else 0.0
-    return factor * (flap * blade.flap_rate + lag_power)
+    stop_power = lag_stop_moment(rotor, blade) * blade.lag_rate if instant.lead_lag else 0.0
+    return factor * (flap * blade.flap_rate + lag_power) + stop_power
 
 
 def engine_power(aircraft, x, torques):

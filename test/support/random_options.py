@@ -136,6 +136,9 @@ def _share_blades(rotors: list[dict[str, Any]], rng: np.random.Generator) -> Non
                 rotor[key] *= share
         if "lag_damper" in rotor:
             rotor["lag_damper"]["damping"] *= share
+        for key in ("stiffness", "damping"):
+            if "lag_stop" in rotor:
+                rotor["lag_stop"][key] *= share
         if rng.random() < 0.1:
             rotor["blade_lag_damping"] = rng.uniform(0.5, 1.5, blades).tolist()
 
@@ -176,6 +179,24 @@ def _vary_rotor(rotor: dict[str, Any], rng: np.random.Generator) -> None:
         rotor |= {"duct": duct, "duct_expansion": 0.5}
     if rng.random() < 0.25:
         rotor["pitch_lag_coupling"] = float(rng.uniform(-0.1, 0.1))
+    _offset_blades(rotor, rng.spawn(1)[0])  # draws of its own, so that all other options stay
+
+
+def _offset_blades(rotor: dict[str, Any], rng: np.random.Generator) -> None:
+    """Quarter chord and c.g. off the pitch axis, with a swept tip, and stops of the lag hinge."""
+    chord = min(rotor["chord"].get("values", [rotor["chord"].get("tip", math.inf)]))
+    if rng.random() < 0.25:
+        inner, outer = rng.uniform(-0.1, 0.1, 2) * chord
+        rotor["quarter_chord"] = {
+            "stations": [0.3, 0.9, 1.0],
+            "values": [float(inner), float(outer), float(outer - 0.3 * chord * rng.random())],
+        }
+        rotor["chordwise_cg"] = {"root": float(inner), "tip": float(outer)}
+    if rng.random() < 0.25:
+        inertia = rotor["blade_mass"] * (rotor["radius"] - rotor["hinge_offset"]) ** 2 / 3
+        speed = rotor["speed_rpm"] * math.pi / 30
+        ends = [float(rng.uniform(-20.0, -8.0)), float(rng.uniform(8.0, 20.0))]
+        rotor["lag_stop"] = {"range_deg": ends, "stiffness": inertia * speed**2, "damping": 0.1 * inertia * speed}
 
 
 # --- air and body -------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.batch import Case, simulate_batch
 from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.trim import trim
+from sbs_sim.flight.power_balance import POWER_BALANCE
 from sbs_sim.flight.simulate import simulate
 from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight.trimmed_state import trimmed_state
@@ -25,7 +26,7 @@ def main() -> None:
         return
     aircraft, wind = Aircraft.load("sbs"), Wind(turbulence_intensity=(1.0, 1.0, 1.0))
     hover = trim(aircraft)
-    simulate(aircraft, hover, hover.controls, duration=0.01, wind=wind)
+    simulate(aircraft, hover, hover.controls, duration=0.01, wind=wind, outputs=[POWER_BALANCE])
     Simulation(aircraft, trimmed_state(aircraft, hover), hover.swashplate).snapshot()
     linearize(aircraft, point=hover, method="paper")
     simulate_batch([Case(aircraft, hover, wind=wind)] * lane_count(), 0.01, workers=1)

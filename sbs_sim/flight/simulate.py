@@ -10,6 +10,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.flight.controls import Commands
 from sbs_sim.flight.engine_failure import EngineFailure
 from sbs_sim.flight.history import History
+from sbs_sim.flight.power_balance import POWER_BALANCE, check_outputs
 from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP
 from sbs_sim.flight.sortie import Sortie, fly_together
 from sbs_sim.flight.trim_point import TrimPoint
@@ -31,6 +32,7 @@ def simulate(
     ground_altitude: float | None = None,
     actuators: bool = False,
     events: Sequence[EngineFailure] = (),
+    outputs: Sequence[str] = (),
 ) -> History:
     """Fly for a while and return what happened.
 
@@ -54,6 +56,8 @@ def simulate(
         rates of their actuators.
     events : sequence of EngineFailure
         Of aircraft with drives: engines that fail, or run again, on the way.
+    outputs : sequence of str
+        What else to work out, afterwards, at every row: "power_balance", where the power of the engines goes.
 
     Returns
     -------
@@ -64,14 +68,18 @@ def simulate(
         simulation state (n,), "phi", "theta", "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed
         relative to the air [m/s]. Of an aircraft that stands on the ground "contact_force" (n, n_points, 3), of the
         ground on its contact points, body axes [N], and "contact_depth" (n, n_points), below the surface [m].
+        With the output "power_balance" also that, (n, len(POWER_TERMS)), and "power_engine", "power_induced" ... (n,)
+        [W] of all terms in `sbs_sim.model.power.POWER_TERMS`: the engines and the actuators of the pitch give what all
+        others take (theory.md section 5.11).
         `warnings` says where the model does not hold.
 
     Raises
     ------
     SimulationError
         See `Simulation`; controls beyond their ranges, naming control, time, value and range, or more rows of them than
-        ticks; the flight cannot go on.
+        ticks; the flight cannot go on; an unknown output, or one that the coupling of the aircraft does not have.
     """
+    check_outputs(outputs)
     sortie = Sortie(
         aircraft,
         start,
@@ -80,6 +88,7 @@ def simulate(
         wind=wind,
         actuators=actuators,
         events=events,
+        balanced=POWER_BALANCE in outputs,
         tick=tick,
         azimuth_step=azimuth_step,
         lead_lag=lead_lag,

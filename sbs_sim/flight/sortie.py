@@ -18,6 +18,7 @@ from sbs_sim.flight.controls import Commands, check_rows, command
 from sbs_sim.flight.engine_failure import EngineFailure, failures_by_tick
 from sbs_sim.flight.formation import Flown, Formation
 from sbs_sim.flight.history import History, named_histories
+from sbs_sim.flight.power_balance import check_balance, named_balance, power_balance
 from sbs_sim.flight.records import Rows
 from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight.trim_point import TrimPoint
@@ -44,6 +45,8 @@ class Sortie:
         Ticks from one row of the histories to the next.
     loaded : bool
         False leaves "acceleration", "thrust", "torque", "power" and "V" out.
+    balanced : bool
+        True adds the balance of power, of a flight that is loaded.
     **options :
         The others of `Simulation`.
 
@@ -70,12 +73,15 @@ class Sortie:
         *,
         every: int = 1,
         loaded: bool = True,
+        balanced: bool = False,
         wind: Wind | None = None,
         actuators: bool = False,
         events: Sequence[EngineFailure] = (),
         **options: Any,
     ) -> None:
         checks.instance("aircraft", aircraft, Aircraft, SimulationError)
+        if balanced:
+            check_balance(aircraft)
         duration = checks.number("duration", duration, 0.0, 1e6, "s", SimulationError)
         actuators = checks.flag("actuators", actuators, SimulationError)
         air = Wind() if wind is None else wind
@@ -89,7 +95,7 @@ class Sortie:
         self.ticks = round(duration / self.simulation.tick)
         check_rows(controls, self.ticks, self.simulation.tick)
         self.failures = failures_by_tick(self.simulation, events)
-        self.every, self.loaded = every, loaded
+        self.every, self.loaded, self.balanced = every, loaded, balanced
         self.fault: SimulationError | None = None
         self._blocks: list[tuple[Rows, Array]] = []
         self._looks: list[Array] = []
@@ -128,7 +134,17 @@ class Sortie:
         aircraft = self.simulation.aircraft
         working = np.concatenate(self._looks)
         lines = (*flight_warnings(aircraft, working), *self._pilot.warnings(self.simulation.tick))
-        return History(named_histories(aircraft, self._blocks, self.loaded), lines), self.fault
+        named = named_histories(aircraft, self._blocks, self.loaded)
+        return History(named | self._balance(), lines), self.fault
+
+    def _balance(self) -> dict[str, Array]:
+        """Histories of the balance of power by name; none where it was not asked for."""
+        if not self.balanced:
+            return {}
+        simulation, rows = self.simulation, Rows.joined([block for block, _ in self._blocks])
+        instants = rows.state, rows.swashplate, simulation.azimuths(rows.step), rows.wind
+        fidelity = (simulation.options[name] for name in ("lead_lag", "cyclic_inflow"))
+        return named_balance(power_balance(simulation.aircraft, *instants, *fidelity))
 
 
 def fly_together(sorties: Sequence[Sortie]) -> None:

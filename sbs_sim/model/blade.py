@@ -214,13 +214,21 @@ def hinge_moments(blade, basis, pose, loads, a_0, a_s):
     return HingeMoments(flap, lag, 1.0 / lag_inertia)
 
 
+class Damper(NamedTuple):
+    """Axial lag damper: its force [N], and its elongation by flap, lag and pitch [m/rad]."""
+
+    force: Any
+    by_flap: Any
+    by_lag: Any
+    by_pitch: Any
+
+
 @kernel
-def with_axial_damper(blade, basis, pose, moments, pitch, pitch_rate):
-    """Hinge moments with those of an axial lag damper, eqs. (3.7) to (3.9).
+def axial_damper(blade, basis, pose, pitch, pitch_rate):
+    """Axial lag damper of a blade, eqs. (3.7) and (3.8).
 
     Parameters
     ----------
-    moments : HingeMoments
     pitch, pitch_rate : lanes
         At the hinge [rad, rad/s].
     """
@@ -238,7 +246,15 @@ def with_axial_damper(blade, basis, pose, moments, pitch, pitch_rate):
     by_lag = rounded((across * (x * cos_flap - z * sin_flap) - along * y) * inverse_length)
     by_pitch = rounded((y * down - z * back) * inverse_length)
     force = rounded(blade.damper_damping * (by_flap * pose.beta_rate + by_lag * pose.xi_rate + by_pitch * pitch_rate))
-    return HingeMoments(moments.flap - by_flap * force, moments.lag - by_lag * force, moments.inverse_lag_inertia)
+    return Damper(force, by_flap, by_lag, by_pitch)
+
+
+@kernel
+def with_axial_damper(blade, basis, pose, moments, pitch, pitch_rate):
+    """Hinge moments with those of an axial lag damper, eq. (3.9); the parameters are those of `axial_damper`."""
+    damper = axial_damper(blade, basis, pose, pitch, pitch_rate)
+    flap, lag = moments.flap - damper.by_flap * damper.force, moments.lag - damper.by_lag * damper.force
+    return HingeMoments(flap, lag, moments.inverse_lag_inertia)
 
 
 @kernel

@@ -185,10 +185,16 @@ def set_drive_rates(x, drive, shaft, commands, dx):
     if drive.free_wheel == 1:
         wanted_torque = maximum(wanted_torque, 0.0)
     dx[drive.torque_index] = drive.inverse_lag * (running * wanted_torque - torque)
+    shaft.torque = shaft_torque(drive, torque, speed)
+
+
+@kernel
+def shaft_torque(drive, torque, speed):
+    """Torque that an engine of some torque gives to the shaft at a speed [N m], eq. (7.13)."""
     given = torque - drive.drag * speed
     if drive.free_wheel == 1:
         given = maximum(given, 0.0)
-    shaft.torque = given
+    return given
 
 
 @kernel

@@ -1053,8 +1053,7 @@ def add_lag_of_flap(aircraft, memory, factor):
 @kernel
 def set_inflow_rates(aircraft, memory, j, dx):
     """Set the inflow rates of a rotor from the sums over its blades, eqs. (6.1) and (6.2)."""
-    rotor, total, x = aircraft.rotors[j], memory.totals[j], memory.state
-    uniform, sine, cosine = rotor.inflow + S.UNIFORM, rotor.inflow + S.SINE, rotor.inflow + S.COSINE
+    rotor, total = aircraft.rotors[j], memory.totals[j]
     scale = rotor.coefficient_scale
     moment_scale = scale / rotor.radius
     loads = Inflow(
@@ -1062,10 +1061,20 @@ def set_inflow_rates(aircraft, memory, j, dx):
         rounded(total.cosine_moment * moment_scale),
         rounded(total.sine_moment * moment_scale),
     )
-    flow = flow_of_disc(aircraft, memory, j)
-    states = Inflow(x[uniform], x[cosine], x[sine])
-    rates = inflow_rates(rotor, states, flow, loads, aircraft.switches[0].cyclic_inflow)
+    rates = rates_of_inflow(aircraft, memory, j, loads)
+    uniform, sine, cosine = rotor.inflow + S.UNIFORM, rotor.inflow + S.SINE, rotor.inflow + S.COSINE
     dx[uniform], dx[cosine], dx[sine] = rates.uniform, rates.cosine, rates.sine
+
+
+@kernel
+def rates_of_inflow(aircraft, memory, j, loads):
+    """Rates of the inflow of a rotor [1/s] under given loads on its disc, eq. (6.1)."""
+    rotor, x = aircraft.rotors[j], memory.state
+    states = Inflow(x[rotor.inflow + S.UNIFORM], x[rotor.inflow + S.COSINE], x[rotor.inflow + S.SINE])
+    flow = flow_of_disc(aircraft, memory, j)
+    rates = inflow_rates(rotor, states, flow, loads, aircraft.switches[0].cyclic_inflow)
+    uniform = rounded(rates.uniform)
     if aircraft.switches[0].ducts == 1:
         ducted = rotor.inflow_speed * INVERSE_MASS * (loads.uniform - flow_of_duct(aircraft, memory, j).rotor)
-        dx[uniform] = select(rotor.duct > 0.0, ducted, rates.uniform)
+        uniform = select(rotor.duct > 0.0, ducted, uniform)
+    return Inflow(uniform, rates.cosine, rates.sine)

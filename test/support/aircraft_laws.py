@@ -45,7 +45,7 @@ def violent_state(model, rng):
     return x
 
 
-def _instant(aircraft, number):
+def instant(aircraft, number):
     """Model of an aircraft with few elements, a violent state, swashplate angles, azimuths and a wind."""
     data = copy.deepcopy(dict(aircraft.data))
     data["options"]["elements"] = ELEMENTS
@@ -59,7 +59,7 @@ def _instant(aircraft, number):
 
 def mirror_error(aircraft, number):
     """Return how far the derivative of the image of a state is from the image of the derivative, relative."""
-    data, model, x, swash, psi, wind = _instant(aircraft, number)
+    data, model, x, swash, psi, wind = instant(aircraft, number)
     rates, image = model.derivative(x, swash, psi, wind), Model(Aircraft.from_dict(mirrored_data(data)))
     count = len(aircraft.rotors)
     mirrored = np.concatenate([mirrored_swash(swash[:count]), swash[count:]])
@@ -72,7 +72,7 @@ def balance_errors(aircraft, number):
 
     On a stand, which takes loads, the energy alone.
     """
-    data, model, x, swash, psi, wind = _instant(aircraft, number)
+    data, model, x, swash, psi, wind = instant(aircraft, number)
     empty = copy.deepcopy(data)
     empty["environment"] = {"air_density": 0.0, "kinematic_viscosity": 1.5e-5, "gravity": aircraft.environment.gravity}
     errors = {}

@@ -1,0 +1,92 @@
+"""Where the power of a flight goes (theory.md section 5.11)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim import checks
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.errors import SimulationError
+from sbs_sim.flight.engine import Engine
+from sbs_sim.model import records as R
+from sbs_sim.model.power import BLADE_POWERS, POWER_TERMS, power_rows
+
+Array = NDArray[np.float64]
+
+POWER_BALANCE = "power_balance"
+
+
+def check_outputs(outputs: Sequence[str]) -> None:
+    """Raise SimulationError for outputs that `simulate` does not have."""
+    names = [outputs] if isinstance(outputs, str) else outputs
+    checks.instance("outputs", names, Sequence, SimulationError)
+    for name in names:
+        checks.choice("outputs", name, (POWER_BALANCE,), SimulationError)
+
+
+def check_balance(aircraft: Aircraft) -> None:
+    """Raise SimulationError for an aircraft whose equations do not conserve energy."""
+    if aircraft.options.coupling != "complete":
+        raise SimulationError(
+            f"outputs: {POWER_BALANCE!r}: options.coupling = {aircraft.options.coupling!r}: allowed is complete; the"
+            " blades of the other coupling do not feel the acceleration of their hub, which does work on them"
+        )
+
+
+def power_balance(
+    aircraft: Aircraft,
+    states: Array,
+    swashplates: Array,
+    azimuths: Array,
+    air: Array,
+    lead_lag: bool = True,
+    cyclic_inflow: bool = True,
+) -> Array:
+    """Power of every term at instants of a flight.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    states : ndarray, shape (n, size)
+    swashplates : ndarray, shape (n, n_rows, 3)
+        [rad]
+    azimuths : ndarray, shape (n, n_rotors)
+        Of the rotors [rad]; of those with a drive where that of the drive is zero.
+    air : ndarray, shape (n, 3)
+        Velocity of the air, NED [m/s].
+    lead_lag, cyclic_inflow : bool
+        Fidelity.
+
+    Returns
+    -------
+    ndarray, shape (n, len(POWER_TERMS))
+        [W], in the order of `POWER_TERMS`: "engine" and "actuators" are what is given, all others what is taken.
+
+    Raises
+    ------
+    SimulationError
+        The coupling of the aircraft does not conserve energy.
+    """
+    check_balance(aircraft)
+    engine = Engine(aircraft.arranged(lead_lag, cyclic_inflow, "blades"))
+    count = len(states)
+    sums = R.records(BLADE_POWERS, len(engine.work.sums), engine.n)
+    found = engine.memory(count, len(POWER_TERMS))
+    power_rows(
+        *(engine.code.derivative, engine.model, _lane(states), _lane(swashplates.reshape(count, -1))),
+        *(_lane(azimuths), _lane(air), engine.work, sums, engine.tick.slopes[0], found),
+    )
+    return np.asarray(found[..., 0])
+
+
+def named_balance(balance: Array) -> dict[str, Array]:
+    """Histories by name of a balance (n, len(POWER_TERMS)): all of it, and each term by itself."""
+    return {POWER_BALANCE: balance} | {f"power_{name}": balance[:, i] for i, name in enumerate(POWER_TERMS)}
+
+
+def _lane(values: Array) -> Array:
+    """Numbers of a flight as the only lane."""
+    return np.ascontiguousarray(values, dtype=float)[..., np.newaxis]

@@ -193,7 +193,8 @@ def structure(simulation: Simulation) -> Any:
     aircraft, model = simulation.aircraft, simulation.model
     blades = tuple(rotor.blades for rotor in aircraft.rotors)
     sections = tuple(tuple(map(id, tables)) for tables in aircraft.sections)
-    drives = model.rotors["drive"], *(model.drives[name] for name in ("engine", "free_wheel", "command_index"))
+    of_rotors = (model.rotors[name] for name in ("drive", "duct", "teetering"))
+    drives = *of_rotors, *(model.drives[name] for name in ("engine", "free_wheel", "command_index"))
     return (
         *(blades, aircraft.options, sections, simulation.steps_per_tick, simulation.method),
         *(simulation.tick, simulation.step, model.switches.tobytes()),

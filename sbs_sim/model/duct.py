@@ -7,10 +7,10 @@ Aerodynamics, chapter 6). `duct_flow` is the control volume of a rotor and a duc
 from typing import Any, NamedTuple
 
 from sbs_sim.lanes import Vector, maximum, minimum, rounded, sqrt
+from sbs_sim.model.inflow import MIN_FLOW
 from sbs_sim.model.kernel import kernel
 
 SLOW = 0.25  # flow through the disc over the velocity of the air far away below which the duct's recovery fades
-MIN_SPEED = 1e-5  # over the tip speed; keeps quotients finite in air that stands still
 
 
 class DuctFlow(NamedTuple):
@@ -64,10 +64,10 @@ def duct_flow(rotor, lambda0, mu):
     leaving = through / rotor.duct_expansion
     share = rotor.duct_turning * (2.0 - rotor.duct_turning)
     approach = edgewise_squared * rotor.inverse_lip_stall * rotor.inverse_lip_stall
-    slope_squared = approach / (through * through + MIN_SPEED * MIN_SPEED)
+    slope_squared = approach / (through * through + MIN_FLOW * MIN_FLOW)
     recovered = rotor.ram_recovery * share * edgewise_squared / (1.0 + slope_squared * slope_squared)
     # the flow turns over: half of the oncoming dynamic pressure changes its sign over a range of slow flow
-    reach = SLOW * sqrt(climb * climb + edgewise_squared + MIN_SPEED * MIN_SPEED)
+    reach = SLOW * sqrt(climb * climb + edgewise_squared + MIN_FLOW * MIN_FLOW)
     x = minimum(maximum(through / reach, -1.0), 1.0)
     sense = x * (1.5 - 0.5 * x * x)
     of_rotor = 0.5 * (leaving * abs(leaving) - sense * (climb * climb + recovered))

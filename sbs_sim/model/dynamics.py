@@ -25,7 +25,6 @@ from sbs_sim.lanes import (
     cross,
     dot,
     rounded,
-    select,
     spread,
     sqrt,
     transposed,
@@ -647,18 +646,17 @@ def body_loads(aircraft, memory, flight, swash):
 def duct_load(aircraft, memory, j):
     """Force and moment about the c.g. of the duct around a rotor, body axes, eq. (5.12) or (6.11)."""
     rotor = aircraft.rotors[j]
-    force = rotor.axes @ Vector(0.0, 0.0, -duct_thrust(rotor.duct_expansion, memory.totals[j].thrust))
-    moment = cross(rotor.hub, force)
-    if aircraft.switches[0].ducts == 1:
+    if rotor.duct == 1:
         mu = memory.flow[j].velocity * rotor.inverse_tip_speed
         flow = flow_of_duct(aircraft, memory, j)
         scale = aircraft.air[0].density * rotor.momentum_scale
         drag = scale * flow.mass_flow * rotor.duct_turning
-        with_exit = rotor.axes @ Vector(-(drag * mu.x), -(drag * mu.y), -(scale * flow.duct))
+        force = rotor.axes @ Vector(-(drag * mu.x), -(drag * mu.y), -(scale * flow.duct))
         at_lip = rotor.axes @ Vector(-(drag * mu.x), -(drag * mu.y), 0.0)
-        up = shaft_down(rotor.axes) * -rotor.lip_arm
-        force = with_exit * rotor.duct + force * (1.0 - rotor.duct)
-        moment = (cross(rotor.hub, with_exit) + cross(up, at_lip)) * rotor.duct + moment * (1.0 - rotor.duct)
+        moment = cross(rotor.hub, force) + cross(shaft_down(rotor.axes) * -rotor.lip_arm, at_lip)
+    else:
+        force = rotor.axes @ Vector(0.0, 0.0, -duct_thrust(rotor.duct_expansion, memory.totals[j].thrust))
+        moment = cross(rotor.hub, force)
     return ForceMoment(force, moment)
 
 
@@ -1074,7 +1072,7 @@ def rates_of_inflow(aircraft, memory, j, loads):
     flow = flow_of_disc(aircraft, memory, j)
     rates = inflow_rates(rotor, states, flow, loads, aircraft.switches[0].cyclic_inflow)
     uniform = rounded(rates.uniform)
-    if aircraft.switches[0].ducts == 1:
-        ducted = rotor.inflow_speed * INVERSE_MASS * (loads.uniform - flow_of_duct(aircraft, memory, j).rotor)
-        uniform = select(rotor.duct > 0.0, ducted, uniform)
+    if rotor.duct == 1:
+        missing = loads.uniform - flow_of_duct(aircraft, memory, j).rotor
+        uniform = rounded(rotor.inflow_speed * INVERSE_MASS * missing)
     return Inflow(uniform, rates.cosine, rates.sine)

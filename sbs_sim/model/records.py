@@ -82,7 +82,6 @@ ROTOR = {
     "hub": VECTOR,
     "axes": MATRIX,  # hub axes as columns in body components
     "duct_expansion": LANES,  # a_w, of a duct with a fixed exit its exit area over that of the disc
-    "duct": LANES,  # 1 for a duct with a fixed exit
     "duct_turning": LANES,  # t
     "ram_recovery": LANES,
     "inverse_lip_stall": LANES,  # 0 where the lip never stalls
@@ -93,6 +92,7 @@ ROTOR = {
     "inverse_blades": LANES,  # 1 / N_b
     "flap_rest": LANES,  # the coning of a teetering rotor
     "teetering": INTEGER,
+    "duct": INTEGER,  # 1 for a duct with a fixed exit
     "blades": INTEGER,  # N_b
     "harmonics": INTEGER,
     "first_quad": INTEGER,

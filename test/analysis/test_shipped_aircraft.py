@@ -1,5 +1,9 @@
 """Aircraft of the repository made of rotors of `sbs`: trims, symmetries, and what each control does."""
 
+import math
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -57,3 +61,35 @@ def test_a_sweep_shows_the_speed_of_a_free_rotor():
     fixed = sweep(Aircraft.load("tandem"), "airspeed", [0.0], linear=False)
     assert not fixed.has_free_speeds
     assert fixed["rotor_speed"].tolist() == [[rotor.speed for rotor in Aircraft.load("tandem").rotors]]
+
+
+PAGE = Path(__file__).resolve().parents[2] / "docs/howto/ducts.md"
+
+
+def test_ducted_trims_are_those_of_the_page():
+    """The paper's aircraft with its ducts on beside that without, and the ends of the bracket of `turning`."""
+    ducted = Aircraft.load("sbs_ducted")
+    columns = [Aircraft.load("sbs"), *(ducted.with_value("rotors.duct.turning", share) for share in (0.0, 0.5, 1.0))]
+    assert ducted == columns[2]
+    rows = re.findall(r"^\| (\d+) m/s \| pitch, power \| (.+) \|$", PAGE.read_text(), flags=re.MULTILINE)
+    assert [int(speed) for speed, _ in rows] == [0, 5, 10, 15, 20]
+    for speed, cells in rows:
+        for aircraft, cell in zip(columns, cells.split(" | "), strict=True):
+            point = trim(aircraft, float(speed))
+            pitch, power = (float(number) for number in re.findall(r"-?\d+\.?\d*", cell))
+            assert math.degrees(point.pitch) == pytest.approx(pitch, abs=0.06)
+            assert point.power.sum() == pytest.approx(power, abs=0.6)
+            assert point.beyond_limits == ()
+
+
+def test_ducts_turn_what_the_page_says():
+    """Ram drag of all of the flow at 0.8 hover inflows of the open rotor; the phugoid decays with ducts."""
+    ducted, open_ = Aircraft.load("sbs_ducted"), Aircraft.load("sbs")
+    hover, rotor = trim(ducted), ducted.rotors[0]
+    area, weight = math.pi * rotor.radius**2, ducted.body.mass * ducted.environment.gravity
+    through = hover["lambda0(1)"] * rotor.speed * rotor.radius
+    speed = 0.8 * math.sqrt(weight / 2 / (2 * ducted.environment.air_density * area))
+    drag = 2 * ducted.environment.air_density * area * through * speed
+    assert speed == pytest.approx(5.7, abs=0.05)
+    assert drag / weight == pytest.approx(0.57, abs=0.01)
+    assert linearize(ducted).mode("phugoid").pole.real < 0.0 < linearize(open_).mode("phugoid").pole.real

@@ -70,12 +70,6 @@ class Rows(Instants[NDArray[np.int64], Array]):
         columns = ([getattr(one, part.name) for one in snapshots] for part in fields(cls))
         return cls(*(_column(values) for values in columns))
 
-    @classmethod
-    def joined(cls, blocks: Sequence[Rows]) -> Rows:
-        """Rows of several blocks, one after the other; without working states."""
-        names = [part.name for part in fields(cls) if part.name != "working"]
-        return cls(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
-
     def first(self, count: int) -> Rows:
         """The first instants."""
         columns: list[Any] = [getattr(self, part.name) for part in fields(self)]

@@ -68,10 +68,9 @@ def simulate(
         simulation state (n,), "phi", "theta", "psi" (n,) [rad], roll, pitch and heading, and "V" (n,), the speed
         relative to the air [m/s]. Of an aircraft that stands on the ground "contact_force" (n, n_points, 3), of the
         ground on its contact points, body axes [N], and "contact_depth" (n, n_points), below the surface [m].
-        relative to the air [m/s]. With the output "power_balance" also that, (n, len(POWER_TERMS)), and "power_engine",
-        "power_induced" ... (n,) [W] of all terms in
-        `sbs_sim.model.power.POWER_TERMS`: the engines and the actuators of the pitch
-        give what all others take (theory.md section 5.11).
+        With the output "power_balance" also that, (n, len(POWER_TERMS)), and "power_engine", "power_induced" ... (n,)
+        [W] of all terms in `sbs_sim.model.power.POWER_TERMS`: the engines and the actuators of the pitch give what all
+        others take (theory.md section 5.11).
         `warnings` says where the model does not hold.
 
     Raises

@@ -2,7 +2,7 @@
 # Made by tools/make_completion.py: do not edit.
 # shellcheck shell=bash disable=SC2207  # no completion has blanks in it
 
-_sbs_sim_names='simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep batch reproduce validate gusts plot airfoil aircraft'
+_sbs_sim_names='simulator control_mixer analysis hover_hold teleop joystick replay cockpit trim linearize sweep qualities batch reproduce validate gusts plot airfoil aircraft'
 _sbs_sim_own='build test shell python completion --help --version'
 _sbs_sim_aircraft='caradonna_tung castles_gray coaxial hammond ormiston_hodges pca2 quadrotor sbs sbs_ducted sbs_paper tandem uh60a_genhel uh60a_tm85890'
 _sbs_sim_conditions='airspeed climb_rate sideslip_deg turn_rate_deg'
@@ -16,6 +16,7 @@ _sbs_sim_options() {
         'trim') echo '--help --version --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --guess-deg --method --json' ;;
         'linearize') echo '--help --version --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --guess-deg --method --quasi-static --matrices --derivatives --participation --floquet --out --json' ;;
         'sweep') echo '--help --version --values --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --guess-deg --trims-only --workers --dask --out --csv --json' ;;
+        'qualities') echo '--help --version --aircraft --set --airspeeds --delay --scale-length --attitude-command --workers --json --out' ;;
         'batch') echo '--help --version --flights --duration --turbulence --length --seed --spread --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --workers --dask --every --out --csv --json' ;;
         'reproduce') echo '--help --version --aircraft --paper-aircraft --json --out' ;;
         'validate') echo '--help --version --list --json --page --strict' ;;
@@ -28,9 +29,9 @@ _sbs_sim_options() {
 
 _sbs_sim_follows() {
     case $1 in
-        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'validate --json' | 'validate --page' | 'gusts --json' | 'plot' | 'plot --out' | 'airfoil' | 'airfoil --out' | 'aircraft --out') echo '@files' ;;
-        'replay --set' | 'trim --set' | 'linearize --set' | 'sweep --set' | 'batch --spread' | 'batch --set' | 'gusts --set' | 'aircraft --set') echo '@assigned' ;;
-        'trim --aircraft' | 'linearize --aircraft' | 'sweep --aircraft' | 'batch --aircraft' | 'reproduce --aircraft' | 'reproduce --paper-aircraft' | 'gusts --aircraft' | 'aircraft --aircraft') echo '@aircraft' ;;
+        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'qualities --json' | 'qualities --out' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'validate --json' | 'validate --page' | 'gusts --json' | 'plot' | 'plot --out' | 'airfoil' | 'airfoil --out' | 'aircraft --out') echo '@files' ;;
+        'replay --set' | 'trim --set' | 'linearize --set' | 'sweep --set' | 'qualities --set' | 'batch --spread' | 'batch --set' | 'gusts --set' | 'aircraft --set') echo '@assigned' ;;
+        'trim --aircraft' | 'linearize --aircraft' | 'sweep --aircraft' | 'qualities --aircraft' | 'batch --aircraft' | 'reproduce --aircraft' | 'reproduce --paper-aircraft' | 'gusts --aircraft' | 'aircraft --aircraft') echo '@aircraft' ;;
         'trim --method') echo 'newton two_loop' ;;
         'linearize --method') echo 'averaged paper' ;;
         'sweep') echo '@paths' ;;

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from sbs_sim.analysis.batch import Batch, Case, simulate_batch
     from sbs_sim.analysis.linear_model import LinearModel
     from sbs_sim.analysis.linearize import linearize
+    from sbs_sim.analysis.qualities import Qualities, qualities
     from sbs_sim.analysis.sweep import Sweep, sweep
     from sbs_sim.analysis.trim import trim
     from sbs_sim.flight.engine_failure import EngineFailure
@@ -31,6 +32,8 @@ _HOME = {
     "EngineFailure": "sbs_sim.flight.engine_failure",
     "LinearModel": "sbs_sim.analysis.linear_model",
     "linearize": "sbs_sim.analysis.linearize",
+    "Qualities": "sbs_sim.analysis.qualities",
+    "qualities": "sbs_sim.analysis.qualities",
     "Sweep": "sbs_sim.analysis.sweep",
     "sweep": "sbs_sim.analysis.sweep",
     "TrimPoint": "sbs_sim.flight.trim_point",
@@ -44,10 +47,12 @@ __all__ = [
     "Case",
     "EngineFailure",
     "LinearModel",
+    "Qualities",
     "Simulation",
     "Sweep",
     "TrimPoint",
     "linearize",
+    "qualities",
     "simulate",
     "simulate_batch",
     "sweep",

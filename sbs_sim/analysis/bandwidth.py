@@ -28,6 +28,7 @@ GAIN_MARGIN = 10.0 ** (6.0 / 20.0)  # of the gain bandwidth: 6 dB
 POINTS = 800  # of the search
 LOWEST, WIDEST = 0.01, 3.0  # of the search over the slowest and fastest pole of the body
 HIGHEST = 3.0  # over the fastest pole of all
+STILL = 1e-9  # of the fastest pole of the body: what rounding makes of an integrator
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +122,10 @@ def bandwidth_of(transfer: Transfer, input_name: str, output_name: str, is_rate_
     phase = transfer.phase(grid) + offset
 
     def phase_at(frequency: float) -> float:
-        return float(transfer.phase(np.array([frequency]))[0]) + offset
+        """Beside the nearest frequency of the grid, from which the phase turns by less than half a turn."""
+        near = int(np.abs(grid - frequency).argmin())
+        here, there = transfer.at(np.array([frequency, grid[near]]))
+        return float(phase[near] + np.angle(here / there))
 
     def falls_through(level: float, end: int) -> float:
         """Highest frequency of a part of the grid at which the phase falls through a level."""
@@ -140,7 +144,9 @@ def bandwidth_of(transfer: Transfer, input_name: str, output_name: str, is_rate_
         crossing,
         falls_through(CROSSING + MARGIN, below),
         math.nan if math.isnan(crossing) else _gain_bandwidth(transfer, grid, crossing),
-        math.nan if math.isnan(crossing) else (CROSSING - phase_at(2.0 * crossing)) / (2.0 * crossing),
+        math.nan
+        if math.isnan(crossing)
+        else (CROSSING - offset - float(transfer.phase(np.array([2.0 * crossing]))[0])) / (2.0 * crossing),
         float(phase[: top + 1].max()),
         is_rate_command,
     )
@@ -150,8 +156,9 @@ def _search(transfer: Transfer) -> tuple[Array, int]:
     """Frequencies of the search, and how many of them are those of the body."""
     of_body = transfer.poles if transfer.settled is None else transfer.settled.poles
     speeds = np.abs(of_body)
-    growing = speeds[(of_body.real > 0.0) & (speeds > 0.0)]
-    slowest = float(growing.max()) if len(growing) else LOWEST * float(speeds[speeds > 0.0].min())
+    moving = speeds > STILL * speeds.max()  # else an integrator
+    growing = speeds[(of_body.real > 0.0) & moving]
+    slowest = float(growing.max()) if len(growing) else LOWEST * float(speeds[moving].min())
     fastest = WIDEST * float(speeds.max())
     last = max(HIGHEST * float(np.abs(transfer.poles).max()), fastest)
     if transfer.delay > 0.0:  # which alone turns the phase by half a turn

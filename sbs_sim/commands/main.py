@@ -11,6 +11,7 @@ EXECUTABLES = {
     "trim": ("sbs_sim.commands.trim:main", "trim an aircraft"),
     "linearize": ("sbs_sim.commands.linearize:main", "linear model of a steady flight, with its modes"),
     "sweep": ("sbs_sim.commands.sweep:main", "trims and modes along one parameter"),
+    "qualities": ("sbs_sim.commands.qualities:main", "flying qualities over airspeed, with levels"),
     "batch": ("sbs_sim.commands.batch:main", "Monte Carlo: many flights through turbulence"),
     "reproduce": ("sbs_sim.commands.reproduce:main", "the paper's results beside ours"),
     "validate": ("sbs_sim.commands.validate:main", "published results of others beside ours"),

@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 EXECUTABLES = (
     "simulator control_mixer analysis hover_hold teleop joystick replay cockpit"
-    " trim linearize sweep batch reproduce validate gusts plot airfoil aircraft"
+    " trim linearize sweep qualities batch reproduce validate gusts plot airfoil aircraft"
 )
 
 # What the script itself calls; everything else is taken away from it.

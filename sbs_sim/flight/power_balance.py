@@ -36,20 +36,13 @@ def check_balance(aircraft: Aircraft) -> None:
         )
 
 
-def power_balance(
-    aircraft: Aircraft,
-    states: Array,
-    swashplates: Array,
-    azimuths: Array,
-    air: Array,
-    lead_lag: bool = True,
-    cyclic_inflow: bool = True,
-) -> Array:
+def power_balance(engine: Engine, states: Array, swashplates: Array, azimuths: Array, air: Array) -> Array:
     """Power of every term at instants of a flight.
 
     Parameters
     ----------
-    aircraft : Aircraft
+    engine : Engine
+        Of one aircraft with the `complete` coupling, its blades in the lanes: `Simulation.engine`.
     states : ndarray, shape (n, size)
     swashplates : ndarray, shape (n, n_rows, 3)
         [rad]
@@ -57,21 +50,12 @@ def power_balance(
         Of the rotors [rad]; of those with a drive where that of the drive is zero.
     air : ndarray, shape (n, 3)
         Velocity of the air, NED [m/s].
-    lead_lag, cyclic_inflow : bool
-        Fidelity.
 
     Returns
     -------
     ndarray, shape (n, len(POWER_TERMS))
         [W], in the order of `POWER_TERMS`: "engine" and "actuators" are what is given, all others what is taken.
-
-    Raises
-    ------
-    SimulationError
-        The coupling of the aircraft does not conserve energy.
     """
-    check_balance(aircraft)
-    engine = Engine(aircraft.arranged(lead_lag, cyclic_inflow, "blades"))
     count = len(states)
     sums = R.records(BLADE_POWERS, len(engine.work.sums), engine.n)
     found = engine.memory(count, len(POWER_TERMS))

@@ -141,10 +141,12 @@ class Sortie:
         """Histories of the balance of power by name; none where it was not asked for."""
         if not self.balanced:
             return {}
-        simulation, rows = self.simulation, Rows.joined([block for block, _ in self._blocks])
-        instants = rows.state, rows.swashplate, simulation.azimuths(rows.step), rows.wind
-        fidelity = (simulation.options[name] for name in ("lead_lag", "cyclic_inflow"))
-        return named_balance(power_balance(simulation.aircraft, *instants, *fidelity))
+        simulation, blocks = self.simulation, [rows for rows, _ in self._blocks]
+        states, angles, steps, air = (
+            np.concatenate([getattr(rows, name) for rows in blocks]) for name in ("state", "swashplate", "step", "wind")
+        )
+        instants = states, angles, simulation.azimuths(steps), air
+        return named_balance(power_balance(simulation.engine, *instants))
 
 
 def fly_together(sorties: Sequence[Sortie]) -> None:

@@ -94,11 +94,12 @@ class Flow(NamedTuple):
 
 
 class AirLoads(NamedTuple):
-    """Air loads of a blade: six-vector about p*, along (y, t, u); Int dF_n and Int s dF_n for the inflow."""
+    """Air loads of a blade: six-vector about p*, along (y, t, u); Int dF_n, Int s dF_n and Int s dF_d."""
 
     load: Any
     normal_force: Any
     normal_moment: Any
+    span_moment: Any
 
 
 class Equations(NamedTuple):
@@ -320,7 +321,7 @@ def offset_air_loads(air, blade, basis, elements, knots, table, flow, pitch):
     """
     cos_pitch, sin_pitch = cosine_sine(pitch)
     zero = zeros_like(pitch)
-    force_d = force_t = force_n = moment_d = moment_t = moment_n = normal_moment = zero
+    force_d = force_t = force_n = moment_d = moment_t = moment_n = normal_moment = span_moment = zero
     for i in range(elements.shape[0]):
         element = elements[i]
         s = element.span
@@ -351,12 +352,13 @@ def offset_air_loads(air, blade, basis, elements, knots, table, flow, pitch):
         moment_d = moment_d + (ahead * f_n - above * f_t)
         moment_t = moment_t + (above * f_d - s * f_n)
         moment_n = moment_n + (s * f_t - ahead * f_d)
-        normal_moment = normal_moment + s * f_n
+        normal_moment, span_moment = normal_moment + s * f_n, span_moment + s * f_d
     d, t, n = basis.span, along_motion(), basis.normal
     return AirLoads(
         ForceMoment(d * force_d + t * force_t + n * force_n, d * moment_d + t * moment_t + n * moment_n),
         force_n,
         normal_moment,
+        span_moment,
     )
 
 

@@ -23,12 +23,15 @@ from sbs_sim.lanes import (
 from sbs_sim.model import state as S
 from sbs_sim.model.blade import (
     ForceMoment,
+    HingeMoments,
     axial_damper,
     blade_accelerations,
     blade_basis,
     blade_motion,
     to_blade,
+    with_lag_stops,
 )
+from sbs_sim.model.contact import contact_load
 from sbs_sim.model.drive import ACCELERATIONS, AZIMUTHS, NONE, shaft_torque, transmission_loads
 from sbs_sim.model.duct import sheltered
 from sbs_sim.model.dynamics import (
@@ -42,6 +45,7 @@ from sbs_sim.model.dynamics import (
     induced_velocity,
     mass_matrix,
     memory_in_lanes,
+    pitch_motion,
     pitch_rate,
     rates_of_inflow,
     stand_loads,
@@ -52,6 +56,17 @@ from sbs_sim.model.dynamics import (
 from sbs_sim.model.fuselage import plate_drag
 from sbs_sim.model.inflow import INVERSE_INERTIA, INVERSE_MASS, Inflow
 from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.offset import (
+    Field,
+    axis_point,
+    freedoms,
+    known_field,
+    of_mass,
+    offset_air_loads,
+    offset_flow,
+    pitched_mass,
+    turned,
+)
 from sbs_sim.model.records import LANES
 from sbs_sim.model.section import SectionFlow, section_loads
 from sbs_sim.model.surfaces import fuselage_load, surface_load
@@ -198,88 +213,252 @@ def add_blades(aircraft, memory, bodies, commands, psi, turning, sums, terms):
             terms[ACTUATORS] = terms[ACTUATORS] + own.actuators
 
 
+class Blade(NamedTuple):
+    """A register of blades: pose, directions and motions, velocity and acceleration of the hub over ground.
+
+    Attributes
+    ----------
+    velocity, acceleration : Vector
+        Of the hub, along (y, t, u) [m/s], [m/s^2].
+    alpha : Vector
+        Angular acceleration of hub and shaft [rad/s^2], with the factor G as `Motion`.
+    speeding : lanes
+        That of the shaft alone.
+    gravity : Vector
+        Along (y, t, u) [m/s^2].
+    met : Vector
+        Velocity of the hub relative to the air that the blades meet, hub axes [m/s].
+    """
+
+    pose: Any
+    basis: Any
+    motion: Any
+    velocity: Any
+    acceleration: Any
+    alpha: Any
+    speeding: Any
+    gravity: Any
+    met: Any
+
+
+@kernel
+def blade_at(aircraft, memory, bodies, psi, turning, r):
+    """A register of blades in motion."""
+    record, flight = aircraft.blades[r], bodies.flight
+    pose = blade_pose(aircraft, memory.state, record, psi)
+    basis, hub, to_hub = blade_basis(record, pose), hub_motion(record, flight), transposed(record.axes)
+    speeding = zeros_like(pose.beta)
+    if turning.shape[1] > 0:
+        speeding = spread(turning[ACCELERATIONS], aircraft.indices.azimuth, record.quad, record)
+    acceleration = to_hub @ (bodies.acceleration + cross(bodies.angular, record.hub)) + hub.centripetal
+    met = hub.air_velocity
+    if aircraft.switches[0].ducts == 1:
+        met = sheltered(record.duct_turning, met)
+    return Blade(
+        pose=pose,
+        basis=basis,
+        motion=blade_motion(record, basis, pose, hub.omega),
+        velocity=to_blade(record, basis, to_hub @ (flight.velocity + cross(flight.omega, record.hub))),
+        acceleration=to_blade(record, basis, acceleration),
+        alpha=to_blade(record, basis, to_hub @ bodies.angular) * record.sense + Vector(ZERO, ZERO, speeding),
+        speeding=speeding,
+        gravity=to_blade(record, basis, to_hub @ flight.gravity),
+        met=met,
+    )
+
+
 @kernel
 def blade_powers(aircraft, memory, bodies, commands, psi, turning, r):
     """Powers of a register of blades, in the order of BLADE_POWERS, eqs. (5.23) to (5.26)."""
-    blade, terms, flight = aircraft.blades[r], memory.terms[r], bodies.flight
-    pose = blade_pose(aircraft, memory.state, blade, psi)
-    basis = blade_basis(blade, pose)
-    hub = hub_motion(blade, flight)
-    motion = blade_motion(blade, basis, pose, hub.omega)
-    to_hub = transposed(blade.axes)
+    record, terms = aircraft.blades[r], memory.terms[r]
+    blade = blade_at(aircraft, memory, bodies, psi, turning, r)
+    inflow = inflow_of(aircraft, memory, record, blade)
+    if aircraft.switches[0].offsets == 1:
+        pitching = pitch_motion(aircraft, record, blade.pose, commands)
+        kinetic, gravity = offset_energy(record, terms, blade, pitching, memory.pitching[r].slope)
+        air = offset_air_powers(aircraft, memory, r, blade, pitching, inflow)
+    else:
+        kinetic, gravity = energy_rates(record, terms, blade)
+        air = air_powers(aircraft, memory, r, blade, inflow)
+    hinges = hinge_powers(aircraft, record, terms, blade, commands)
+    to_hub, flight = transposed(record.axes), bodies.flight
+    carried = hub_motion(record, flight).air_velocity - blade.met
+    return (
+        air.induced,
+        air.wash,
+        air.profile,
+        -dot(to_blade(record, blade.basis, carried), air.force),
+        -dot(to_blade(record, blade.basis, to_hub @ bodies.air), air.force),
+        gravity,
+        kinetic,
+        hinges.springs,
+        hinges.dampers,
+        hinges.actuators,
+    )
+
+
+@kernel
+def energy_rates(record, terms, blade):
+    """Rate of the kinetic energy, and power that the weight takes, eq. (5.26)."""
+    basis, motion = blade.basis, blade.motion
     forward = Vector(ZERO, 1.0, ZERO)  # t
-    # velocity and acceleration over ground at the flap hinge, and their slopes along the blade
-    ground = to_hub @ (flight.velocity + cross(flight.omega, blade.hub))
-    hinge = to_blade(blade, basis, ground) + cross(motion.hub, basis.lag_hinge) + cross(motion.arm, basis.flap_hinge)
+    hinge = blade.velocity + cross(motion.hub, basis.lag_hinge) + cross(motion.arm, basis.flap_hinge)
     slope = cross(motion.blade, basis.span)
     own = blade_accelerations(basis, motion)
-    speeding = zeros_like(pose.beta)
-    if turning.shape[1] > 0:
-        speeding = spread(turning[ACCELERATIONS], aircraft.indices.azimuth, blade.quad, blade)
-    alpha = to_blade(blade, basis, to_hub @ bodies.angular) * blade.sense + Vector(ZERO, ZERO, speeding)
-    hub_acceleration = to_hub @ (bodies.acceleration + cross(bodies.angular, blade.hub)) + hub.centripetal
-    hinge_acceleration = (
-        to_blade(blade, basis, hub_acceleration)
+    at_hinge = (
+        blade.acceleration
         + own.hinge
-        + cross(alpha, basis.lag_hinge + basis.flap_hinge)
-        - forward * (blade.flap_hinge_offset * terms.lag_acceleration)
+        + cross(blade.alpha, basis.lag_hinge + basis.flap_hinge)
+        - forward * (record.flap_hinge_offset * terms.lag_acceleration)
     )
-    slope_acceleration = (
+    along_blade = (
         own.slope
-        + cross(alpha, basis.span)
+        + cross(blade.alpha, basis.span)
         + basis.normal * terms.flap_acceleration
         - forward * (basis.cos_flap * terms.lag_acceleration)
     )
-    first, second = blade.first_moment, blade.hub_second_moment
+    first, second = record.first_moment, record.hub_second_moment
     kinetic = (
-        blade.mass * dot(hinge, hinge_acceleration)
-        + first * (dot(hinge, slope_acceleration) + dot(slope, hinge_acceleration))
-        + second * dot(slope, slope_acceleration)
+        record.mass * dot(hinge, at_hinge)
+        + first * (dot(hinge, along_blade) + dot(slope, at_hinge))
+        + second * dot(slope, along_blade)
     )
-    gravity = -dot(to_blade(blade, basis, to_hub @ flight.gravity), hinge * blade.mass + slope * first)
-    springs = (
-        blade.flap_spring * (pose.beta - blade.flap_rest) * pose.beta_rate
-        + blade.lag_spring * (pose.xi - blade.lag_rest) * pose.xi_rate
+    return rounded(kinetic), rounded(-dot(blade.gravity, hinge * record.mass + slope * first))
+
+
+@kernel
+def offset_energy(record, terms, blade, pitching, pitch_slope):
+    """The same of a blade with offsets: a rigid body that turns about p* (theory.md section 3.6)."""
+    basis, motion = blade.basis, blade.motion
+    start, turn = offset_motion(record, blade, blade.velocity, pitching.rate)
+    known = known_field(record, basis, motion, pitching, blade.acceleration)
+    free, alpha = freedoms(record, basis), blade.alpha
+    flap, lag = turned(basis, free.flap), turned(basis, free.lag)
+    pitch = turned(basis, free.pitch)
+    by_shaft, d, t, n = pitch_slope * blade.speeding, basis.span, Vector(ZERO, 1.0, ZERO), basis.normal
+    at_flap, at_lag = terms.flap_acceleration, terms.lag_acceleration
+    field = Field(
+        known.start + flap.start * at_flap + lag.start * at_lag + cross(alpha, axis_point(record, basis)),
+        known.along + flap.along * at_flap + lag.along * at_lag + cross(alpha, d),
+        known.chord + flap.chord * at_flap + lag.chord * at_lag + pitch.chord * by_shaft + cross(alpha, t),
+        known.normal + flap.normal * at_flap + lag.normal * at_lag + pitch.normal * by_shaft + cross(alpha, n),
     )
-    dampers = rounded(blade.lag_damping * pose.xi_rate * pose.xi_rate)
-    actuators = zeros_like(pose.beta)
-    if aircraft.switches[0].axial_dampers == 1:
-        rate = pitch_rate(aircraft, blade, pose, commands)
-        damper = axial_damper(blade, basis, pose, terms.pitch, rate)
-        elongation = damper.by_flap * pose.beta_rate + damper.by_lag * pose.xi_rate + damper.by_pitch * rate
-        dampers = rounded(dampers + damper.force * elongation)
-        actuators = rounded(damper.force * damper.by_pitch * rate)
+    zero = Vector(ZERO, ZERO, ZERO)
+    mass = pitched_mass(record, terms.pitch)
+    inertial = of_mass(record, basis, mass, field)
+    weight = of_mass(record, basis, mass, Field(blade.gravity, zero, zero, zero))
+    kinetic = dot(inertial.force, start) + dot(inertial.moment, turn)
+    return rounded(kinetic), rounded(-(dot(weight.force, start) + dot(weight.moment, turn)))
+
+
+@kernel
+def offset_motion(record, blade, hub_velocity, pitch_rate):
+    """Velocity of p* of a hub that moves with a velocity along (y, t, u) [m/s], and angular velocity of the blade."""
+    basis, motion = blade.basis, blade.motion
+    hinge = hub_velocity + cross(motion.hub, basis.lag_hinge) + cross(motion.arm, basis.flap_hinge)
+    start = hinge + cross(motion.blade, basis.normal) * record.axis_height
+    return start, motion.blade + basis.span * pitch_rate
+
+
+class Met(NamedTuple):
+    """Induced velocity at the hub [m/s] and its slope along the radius [1/s], and what of both is wash."""
+
+    induced: Any
+    gradient: Any
+    wash: Any
+    wash_gradient: Any
+
+
+@kernel
+def inflow_of(aircraft, memory, record, blade):
+    """What blades meet of the inflow."""
+    induced, gradient = induced_velocity(aircraft, memory, record, blade.pose)
+    wash, wash_gradient = zeros_like(blade.pose.beta), zeros_like(blade.pose.beta)
+    if aircraft.switches[0].wash == 1:
+        wash, wash_gradient = wash_velocity(aircraft, memory, record, blade.pose)
+    return Met(rounded(induced), rounded(gradient), wash, wash_gradient)
+
+
+class AirPowers(NamedTuple):
+    """What the air takes of blades, eq. (5.24) [W], and the force of the air on them, along (y, t, u) [N]."""
+
+    induced: Any
+    wash: Any
+    profile: Any
+    force: Any
+
+
+@kernel
+def air_powers(aircraft, memory, r, blade, inflow):
+    """What the air takes of blades by the forces and the flow of their sections, eq. (5.24)."""
+    record, terms, basis = aircraft.blades[r], memory.terms[r], blade.basis
     flow = SectionFlow(terms.u_t_hinge, terms.u_t_slope, terms.u_p_hinge, terms.u_p_slope)
-    elements, air = aircraft.elements[blade.elements], aircraft.air[0]
-    loads = section_loads(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, terms.pitch)
+    elements, air = aircraft.elements[record.elements], aircraft.air[0]
+    loads = section_loads(air, record, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, terms.pitch)
     profile = -(
         (flow.u_t_hinge * loads.forward_force + flow.u_t_slope * loads.forward_moment)
         + (flow.u_p_hinge * loads.normal_force + flow.u_p_slope * loads.normal_moment)
     )
-    induced, gradient = induced_velocity(aircraft, memory, blade, pose)
-    wash, wash_gradient = zeros_like(pose.beta), zeros_like(pose.beta)
-    if aircraft.switches[0].wash == 1:
-        wash, wash_gradient = wash_velocity(aircraft, memory, blade, pose)
-    lift = basis.cos_flap * loads.normal_force
-    root_moment = basis.cos_flap * (blade.hinge_offset * loads.normal_force + loads.normal_moment)
-    force = basis.normal * loads.normal_force + forward * loads.forward_force
-    blowing = -dot(to_blade(blade, basis, to_hub @ bodies.air), force)
-    carried = zeros_like(pose.beta)
-    if aircraft.switches[0].ducts == 1:
-        with_duct = hub.air_velocity - sheltered(blade.duct_turning, hub.air_velocity)
-        carried = -dot(to_blade(blade, basis, with_duct), force)
-    return (
-        (induced - wash) * lift + (gradient - wash_gradient) * root_moment,
-        wash * lift + wash_gradient * root_moment,
-        profile,
-        carried,
-        blowing,
-        gravity,
-        kinetic,
-        springs,
-        dampers,
-        actuators,
+    lift = rounded(basis.cos_flap * loads.normal_force)
+    moment = rounded(basis.cos_flap * (record.hinge_offset * loads.normal_force + loads.normal_moment))
+    force = basis.normal * loads.normal_force + Vector(ZERO, 1.0, ZERO) * loads.forward_force
+    return powers_of(inflow, lift, moment, rounded(profile), force)
+
+
+@kernel
+def offset_air_powers(aircraft, memory, r, blade, pitching, inflow):
+    """The same of blades with offsets."""
+    record, basis, pitch = aircraft.blades[r], blade.basis, memory.terms[r].pitch
+    elements, air, rate = aircraft.elements[record.elements], aircraft.air[0], pitching.rate
+    flow = offset_flow(record, basis, blade.motion, rate, blade.met, inflow.induced, inflow.gradient)
+    loads = offset_air_loads(air, record, basis, elements, aircraft.knots[r], aircraft.table, flow, pitch)
+    force = loads.load.force
+    start, turn = offset_motion(record, blade, to_blade(record, basis, blade.met), rate)
+    span_part = basis.span.z * loads.span_moment
+    moment = rounded(record.hinge_offset * force.z + (basis.cos_flap * loads.normal_moment + span_part))
+    through = rounded(inflow.induced * force.z + inflow.gradient * moment)
+    profile = -(dot(force, start) + dot(loads.load.moment, turn)) - through
+    return powers_of(inflow, rounded(force.z), moment, rounded(profile), force)
+
+
+@kernel
+def powers_of(inflow, lift, moment, profile, force):
+    """Powers by the force along the shaft, and by its moment about it."""
+    wash = rounded(inflow.wash * lift + inflow.wash_gradient * moment)
+    induced = (inflow.induced - inflow.wash) * lift + (inflow.gradient - inflow.wash_gradient) * moment
+    force = Vector(rounded(force.x), rounded(force.y), rounded(force.z))
+    return AirPowers(rounded(induced), wash, profile, force)
+
+
+class HingePowers(NamedTuple):
+    """Power that springs store, that dampers take, and that actuators of the pitch give, eq. (5.25) [W]."""
+
+    springs: Any
+    dampers: Any
+    actuators: Any
+
+
+@kernel
+def hinge_powers(aircraft, record, terms, blade, commands):
+    """Powers at the hinges, eq. (5.25)."""
+    pose = blade.pose
+    springs = rounded(
+        record.flap_spring * (pose.beta - record.flap_rest) * pose.beta_rate
+        + record.lag_spring * (pose.xi - record.lag_rest) * pose.xi_rate
     )
+    dampers = rounded(record.lag_damping * pose.xi_rate * pose.xi_rate)
+    actuators = zeros_like(pose.beta)
+    if aircraft.switches[0].axial_dampers == 1:
+        rate = pitch_rate(aircraft, record, pose, commands)
+        damper = axial_damper(record, blade.basis, pose, terms.pitch, rate)
+        elongation = damper.by_flap * pose.beta_rate + damper.by_lag * pose.xi_rate + damper.by_pitch * rate
+        dampers = rounded(dampers + damper.force * elongation)
+        actuators = rounded(damper.force * damper.by_pitch * rate)
+    if aircraft.switches[0].lag_stops == 1:
+        zero = zeros_like(pose.beta)
+        stops = with_lag_stops(record, pose, HingeMoments(zero, zero, zero)).lag * record.lead_lag
+        springs = rounded(springs - stops * pose.xi_rate)
+    return HingePowers(springs, dampers, actuators)
 
 
 @kernel
@@ -378,6 +557,9 @@ def add_body(aircraft, memory, bodies, commands, rates, terms):
         )
     for j in range(aircraft.rotors.shape[0]):
         add_load(bodies, duct_load(aircraft, memory, j), DUCT, terms)
+    if aircraft.switches[0].contact == 1:
+        load = contact_load(aircraft.ground[0], aircraft.contacts, memory.state, flight)
+        terms[CONTACT] = -(dot(load.force, velocity) + dot(load.moment, omega))
 
 
 @kernel

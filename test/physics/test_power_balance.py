@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from aircraft_laws import instant
 from balances import balance, totals
-from helpers import build
+from helpers import aircraft_data, build, unit
 from random_options import equipped_flights
 
 from sbs_sim import Aircraft, simulate, trim
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.power_balance import power_balance
+from sbs_sim.flight.trimmed_state import trimmed_state
+from sbs_sim.model import state as S
 from sbs_sim.model.power import POWER_TERMS, SUPPLY
 from sbs_sim.model.wind import Wind
 
@@ -72,12 +74,63 @@ def test_the_balance_closes_without_lag_or_cyclic_inflow(fidelity):
     assert missing(manoeuvre(AIRCRAFT["sbs"](), 10.0, 0.2, **fidelity)) < CLOSED * hover_power("sbs")
 
 
+OFFSETS = {
+    "quarter_chord": {"stations": [0.2, 0.7, 1.0], "values": [0.004, 0.008, -0.04]},
+    "chordwise_cg": {"stations": [0.1, 0.7, 1.0], "values": [0.012, 0.006, -0.03]},
+    "twist_deg": {"root": 6.0, "tip": -4.0},
+    "flap_hinge_offset": 0.03,
+    "lag_spring": 20.0,
+    "lag_damping": 0.3,
+    "pitch_flap_coupling": 0.4,
+    "pitch_lag_coupling": -0.2,
+    "lag_stop": {"range_deg": [-0.5, 0.5], "stiffness": 100.0, "damping": 0.1},
+}
+TEETERING = {
+    "blades": 2,
+    "hinge_offset": 0.0,
+    "flap_hinge_offset": 0.0,
+    "flap_hinge": "teetering",
+    "flap_rest_deg": 3.0,
+}
+
+
+@pytest.mark.parametrize("drives", [[], [{"rotors": ["R1"], "inertia": 0.02, "inertia_axis": [0.0, 0.6, 0.1]}]])
+@pytest.mark.parametrize("kind", ["each", "teetering"])
+def test_the_balance_closes_with_blades_off_their_pitch_axis(kind, drives):
+    """Swept blades whose mass is beside the axis turn about it: the shaft gives what their swashplate takes."""
+    rotor = OFFSETS | (TEETERING if kind == "teetering" else {})
+    data = aircraft_data(options={"elements": 5}, every_rotor=rotor)
+    data["rotors"][0] |= {"shaft_direction": unit(0.1, -0.2, -1.0)}
+    data["rotors"][1] |= {"speed_rpm": 2100.0, "duct": DUCT}
+    aircraft = Aircraft.from_dict(data | ({"drives": drives} if drives else {}))
+    _, model, x, swash, psi, wind = instant(aircraft, 3)
+    if kind == "teetering":  # at its precone
+        for j, one in enumerate(aircraft.rotors):
+            x[model.layout.flap(j).start], x[model.layout.flap_rate(j).start] = one.flap_rest, 0.0
+    rows = power_balance(model.engine, *(np.array([values]) for values in (x, swash, psi, wind)))
+    assert missing(rows) < 1e-11 * np.abs(rows).max()
+    assert rows[0][POWER_TERMS.index("profile")] > 0.0
+
+
+@pytest.mark.parametrize("effect", ["none", "measured"])
+def test_the_balance_closes_in_a_touchdown(effect):
+    """Skids take what stops the aircraft; near the ground the blades meet less than their own inflow."""
+    aircraft = AIRCRAFT["sbs"]().with_values({"ground.contact": "contact", "ground.effect": effect})
+    point = trim(aircraft)
+    state = trimmed_state(aircraft, point)
+    state[S.VELOCITY : S.RATES] = 1.0, 0.5, 0.8
+    flight = simulate(aircraft, state, point.controls, 0.3, ground_altitude=-0.35, outputs=["power_balance"])
+    assert missing(flight) < CLOSED * hover_power("sbs")
+    assert flight["power_contact"].max() > 100.0
+    assert (np.abs(flight["power_interference"]).max() > 50.0) == (effect == "measured")
+
+
 @pytest.mark.parametrize("number", range(10))
 def test_terms_of_random_aircraft_are_those_of_the_plain_model(number):
     """Every kind of key and all motions at once: profile, dampers and engines one by one, and the sum."""
     _, aircraft, _ = equipped_flights(6, number)
     _, model, x, swash, psi, wind = instant(aircraft, number)
-    rows = power_balance(model.aircraft, *(np.array([values]) for values in (x, swash, psi, wind)))
+    rows = power_balance(model.engine, *(np.array([values]) for values in (x, swash, psi, wind)))
     found, scale = dict(zip(POWER_TERMS, rows[0], strict=True)), np.abs(rows).max()
     assert missing(rows) < 1e-11 * scale
     model.derivative(x, swash, psi, wind)

@@ -70,14 +70,6 @@ class Rows(Instants[NDArray[np.int64], Array]):
         columns = ([getattr(one, part.name) for one in snapshots] for part in fields(cls))
         return cls(*(_column(values) for values in columns))
 
-    @classmethod
-    def joined(cls, blocks: Sequence[Rows]) -> Rows:
-        """Rows of several blocks, one after the other; without working states."""
-        joined = {part.name: [getattr(block, part.name) for block in blocks] for part in fields(cls)}
-        joined["working"] = [None]
-        has_none = {name: any(column is None for column in columns) for name, columns in joined.items()}
-        return cls(**{name: None if has_none[name] else np.concatenate(joined[name]) for name in joined})
-
     def first(self, count: int) -> Rows:
         """The first instants."""
         columns: list[Any] = [getattr(self, part.name) for part in fields(self)]

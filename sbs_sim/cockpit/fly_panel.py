@@ -34,6 +34,7 @@ KEYS = (
 )
 UNKNOWN = "effect on this aircraft unknown, because it has no trimmed hover"
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
+STAND = "Stand on the ground"
 RECORD, END_RECORD = "Record", "End recording"
 TRIM, LINEARIZE = "Trim here", "Linearize here"
 DOUBLET, TURBULENCE, CALM = "Doublet", "Turbulence", "Calm"
@@ -65,6 +66,9 @@ class Pilot(Protocol):
 
     def reset(self, condition: TrimCondition, height: float) -> Answer:
         """Put the aircraft into a trimmed condition at a height above the origin [m]."""
+
+    def stand(self) -> Answer:
+        """Put the aircraft onto the ground, with all controls at rest."""
 
     def set_pace(self, factor: float) -> Answer:
         """Simulation time over wall time; 0 is as fast as possible."""
@@ -145,6 +149,7 @@ class FlyPanel:
         for handle in (*self.sliders, self._hold):
             handle.remove()
         self._add_controls()
+        self._stand.visible = aircraft.has_contact
         self._show_pace(pace)
 
     def steer(self, note: str) -> None:
@@ -202,6 +207,8 @@ class FlyPanel:
             self._sideslip = gui.add_number("Sideslip [deg]", 0.0, min=-180.0, max=180.0, step=1.0)
             self._turn = gui.add_number("Turn [deg/s]", 0.0, min=-170.0, max=170.0, step=1.0)
             self._height = gui.add_number("Height [m]", 10.0, min=-1e5, max=1e5, step=1.0)
+        self._stand = gui.add_button(STAND, visible=False, hint="on its skids or wheels, with all controls at rest")
+        self._stand.on_click(lambda _: self._on_stand())
 
     def _add_analysis(self) -> None:
         gui = self._server.gui
@@ -249,6 +256,11 @@ class FlyPanel:
         if self._steerable:
             self._release()
             self._try(RESET, lambda: self._pilot.reset(self._condition(), self._height.value))
+
+    def _on_stand(self) -> None:
+        if self._steerable:
+            self._release()
+            self._say(STAND, self._pilot.stand())
 
     def press(self, key: str) -> None:
         """Move the control of a key a step, the way that the key says whatever the sign of this aircraft's control."""

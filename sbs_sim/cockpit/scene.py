@@ -142,12 +142,15 @@ class Scene:
         return labels
 
     def set_ground(self, altitude: float | None) -> None:
-        """Draw level ground at a height above the origin [m], or none; the grid at the origin's height stays."""
+        """Draw the ground at a height above the origin [m], or none; the grid at the origin's height stays."""
         self._ground = altitude
         self._ground_plane.visible = altitude is not None
         self._level.visible = altitude is None or abs(altitude) > THIN * self.scale
         if altitude is not None:
             self._ground_plane.position = (0.0, 0.0, -altitude)
+            slope, heading = self.aircraft.ground.slope, self.aircraft.ground.slope_heading
+            half, tilt = math.cos(slope / 2.0), math.sin(slope / 2.0)  # a turn that raises what is ahead, then upwards
+            self._ground_plane.wxyz = (tilt * math.sin(heading), half, 0.0, -tilt * math.cos(heading))
             cell = self.cell if not self._level.visible else 10.0 * self.cell  # of what is seen from afar
             self._ground_plane.cell_size, self._ground_plane.section_size = cell, 10.0 * cell
 
@@ -170,7 +173,15 @@ class Scene:
             nodes.draw_loads(snapshot.loads[j], self._shown)
             nodes.draw_inflow(state[layout.inflow(j)], self.inflow_range, self._shown)
         self._trail.draw(snapshot.time, state[S.POSITION : S.ATTITUDE], self._shown.trail)
-        self._trail.draw_height(-float(state[S.POSITION + 2]) - (self._ground or 0.0))
+        self._trail.draw_height(-float(state[S.POSITION + 2]) - self._ground_below(*state[: S.POSITION + 2].tolist()))
+
+    def _ground_below(self, north: float, east: float) -> float:
+        """Height above the origin of the ground, or of the origin's level, at a place [m]."""
+        if self._ground is None:
+            return 0.0
+        ground = self.aircraft.ground
+        uphill = north * math.cos(ground.slope_heading) + east * math.sin(ground.slope_heading)
+        return self._ground + uphill * math.tan(ground.slope)
 
     def clear_trail(self) -> None:
         """Forget where the aircraft was."""

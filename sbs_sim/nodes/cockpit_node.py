@@ -36,6 +36,7 @@ from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.model.state import SWASHPLATE_NAMES
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.conversions import snapshot_of, to_seconds
+from sbs_sim.nodes.parameters import ground_altitude
 from sbs_sim.nodes.qos import EVENT_QOS, LATCHED_QOS
 from sbs_sim.nodes.rejections import WARNING_PERIOD
 from sbs_sim.nodes.remote_pilot import RemotePilot
@@ -176,9 +177,8 @@ class Cockpit(Component):
                 known = True
                 try:
                     aircraft = Aircraft.load(settings["aircraft"])
-                    self._found = LiveFlight(
-                        aircraft, self._effects(aircraft), settings["ground_altitude"], settings["real_time_factor"]
-                    )
+                    ground = ground_altitude(aircraft, settings["ground_altitude"])
+                    self._found = LiveFlight(aircraft, self._effects(aircraft), ground, settings["real_time_factor"])
                 except SbsError as error:
                     self.get_logger().error(f"the simulator's aircraft cannot be shown: {error}")
 

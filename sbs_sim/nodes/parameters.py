@@ -9,8 +9,11 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as ROSParameter
 
+from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError
 from sbs_sim.terminal.command_line import suggestion
+
+DEFAULT_GROUND = -100.0  # m
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,12 @@ class Parameter:
     least: float | None = None
     most: float | None = None
     fixed: bool = True
+
+
+def ground_altitude(aircraft: Aircraft, value: float) -> float:
+    """Height of the ground above the origin [m]: that of a parameter, or for its default that of the aircraft file."""
+    own = aircraft.ground.altitude
+    return value if value != DEFAULT_GROUND or own is None else own
 
 
 def declare(node: Node, parameters: dict[str, Parameter]) -> dict[str, Any]:

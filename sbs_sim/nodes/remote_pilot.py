@@ -149,6 +149,10 @@ class RemotePilot:
         request.position.z = -float(height)
         return self._ask("reset", request, ANALYSIS_TIMEOUT)
 
+    def stand(self) -> Answer:
+        """Put the aircraft onto the ground, with all controls at rest."""
+        return self._ask("reset", Reset.Request(on_ground=True), ANALYSIS_TIMEOUT)
+
     def set_pace(self, factor: float) -> Answer:
         """Simulation time over wall time; 0 is as fast as possible."""
         parameter = Parameter("real_time_factor", value=float(factor)).to_parameter_msg()

@@ -30,7 +30,7 @@ from sbs_sim.nodes.command_monitor import CommandMonitor
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.control_mixer import ControlMixer
 from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
-from sbs_sim.nodes.parameters import Parameter, declare
+from sbs_sim.nodes.parameters import DEFAULT_GROUND, Parameter, declare, ground_altitude
 from sbs_sim.nodes.process import run
 from sbs_sim.nodes.qos import COMMAND_QOS, SERVICE_QOS
 from sbs_sim.nodes.recorder_node import RecorderNode
@@ -40,7 +40,6 @@ from sbs_sim.nodes.simulator_outputs import SimulatorOutputs
 OFF = "off"
 # How long a thread keeps the interpreter while the flight waits for it [s]; the 5 ms of Python are half a tick.
 SWITCH_INTERVAL = 0.5e-3
-DEFAULT_GROUND = -100.0  # m
 CONDITION = ("airspeed", "climb_rate", "sideslip", "turn_rate")
 COMPONENTS = ("simulator", "control_mixer", "analysis", "recorder")
 PARAMETERS = {
@@ -145,9 +144,7 @@ class Simulator(Component):
         wind = Wind(velocity=tuple(values["wind"]))
         condition = [values[name] for name in CONDITION]
         position, start = (0.0, 0.0, -values["altitude"]), (values["heading"], wind.velocity, values["rotor_speed"])
-        self._ground = values["ground_altitude"]
-        if self._ground == DEFAULT_GROUND and self.aircraft.ground.altitude is not None:
-            self._ground = self.aircraft.ground.altitude
+        self._ground = ground_altitude(self.aircraft, values["ground_altitude"])
         state, controls = self._beginning(condition, position, *start, values["on_ground"])
         simulation = Simulation(
             self.aircraft,

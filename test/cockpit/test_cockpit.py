@@ -27,6 +27,7 @@ from markup import HOSTILE, Elements
 from matplotlib.text import Text
 from PIL import Image
 from ros_harness import DOMAINS, EXECUTABLES, PATIENCE, environment, world
+from viser.transforms import SO3
 from websockets.datastructures import Headers
 from websockets.exceptions import InvalidStatus
 from websockets.http11 import Request
@@ -668,6 +669,22 @@ def test_the_ground_is_drawn_where_it_is(server, ground, shown, reported):
     if ground is not None:
         assert plane.position[2] == -ground
     assert scene.lines == reported
+
+
+def test_sloping_ground_is_drawn_as_it_rises(server):
+    """To the east: what is drawn upon the plane at 10 m east is higher by 10 tan(slope), and so ends the plumb line."""
+    aircraft = AIRCRAFT.with_values({"ground.slope_deg": 20.0, "ground.slope_heading_deg": 90.0})
+    scene = Scene(server, aircraft, Shown())
+    scene.set_ground(-5.0)
+    plane = server.scene.get_handle_by_name("/ned/earth/ground")
+    turned = SO3(np.array(plane.wxyz)).as_matrix()
+    slope = math.radians(20.0)
+    np.testing.assert_allclose(turned[:, 2], [0.0, -math.sin(slope), -math.cos(slope)], atol=1e-12)  # its upper side
+    snapshot, _ = snapshot_of_flight()
+    scene.draw(snapshot)
+    line = server.scene.get_handle_by_name("/ned/height")
+    _, east, down = snapshot.state[:3]
+    assert line.points[0][1][2] == pytest.approx(-down + 5.0 - east * math.tan(slope), rel=1e-6)
 
 
 @pytest.mark.parametrize(("name", "ducts"), [("sbs", 2), ("tail_rotor", 0), ("tandem", 0)])

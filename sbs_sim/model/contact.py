@@ -44,7 +44,7 @@ class Touch(NamedTuple):
 
 @kernel
 def touch(ground, point, x, to_earth, velocity, omega):
-    """Depth, normal force and velocity of a point, eqs. (7.17) and (7.18)."""
+    """Depth, normal force and velocity of a point, eqs. (7.18) and (7.19)."""
     place = S.vector_at(x, S.POSITION) + to_earth @ point.position
     motion = to_earth @ (velocity + cross(omega, point.position))
     depth = dot(ground.down, place) - ground.depth
@@ -59,7 +59,7 @@ def touch(ground, point, x, to_earth, velocity, omega):
 
 @kernel
 def limited(point, touching, first, second):
-    """Force along the ground within Coulomb's limit [N], eq. (7.19)."""
+    """Force along the ground within Coulomb's limit [N], eq. (7.20)."""
     most = rounded(point.friction * touching.normal)
     if point.is_wheel == 1:
         least = rounded(point.rolling_friction * touching.normal)
@@ -106,7 +106,7 @@ def set_contact_rates(ground, contacts, x, flight, dx):
 
 @kernel
 def give_way(ground, contacts, x):
-    """Let the springs along the ground of a new state give way to Coulomb's limit, eq. (7.20)."""
+    """Let the springs along the ground of a new state give way to Coulomb's limit, eq. (7.21)."""
     to_earth = rotation(S.attitude_at(x))
     velocity, omega = S.vector_at(x, S.VELOCITY), S.vector_at(x, S.RATES)
     for i in range(contacts.shape[0]):

@@ -20,7 +20,7 @@ from sbs_sim.model.wind import Wind
 def main() -> None:
     """Do once what users do, which compiles what it takes, and delete the machine code of earlier sources.
 
-    What only the trim by two loops takes is compiled where that is asked for, within two seconds.
+    What only the trim by two loops, or a rotor alone, takes is compiled where that is asked for, within some seconds.
     """
     if config.DISABLE_JIT:  # the interpreter would take half an hour, and keep nothing
         return
@@ -30,6 +30,9 @@ def main() -> None:
     Simulation(aircraft, trimmed_state(aircraft, hover), hover.swashplate).snapshot()
     linearize(aircraft, point=hover, method="paper")
     simulate_batch([Case(aircraft, hover, wind=wind)] * lane_count(), 0.01, workers=1)
+    driven = Aircraft.load("quadrotor")  # rotor speeds are states: other kernels
+    hover = trim(driven)
+    simulate(driven, hover, hover.controls, duration=0.01)
     folder = cache_folder()
     for other in folder.parent.glob("kernels-*") if folder else ():
         if other != folder:

@@ -424,6 +424,12 @@ class Aircraft(Description):
         return frozen([control.held or 0.0 for control in self.controls])
 
     @cached_property
+    def resting_controls(self) -> Array:
+        """Pilot controls on a stand, shape (n_controls,): what is held, else nearest to 0 in the range."""
+        low, high = np.array([control.range for control in self.controls]).T
+        return frozen(np.clip(self.held_controls, low, high))
+
+    @cached_property
     def trim_scales(self) -> Array:
         """Change that counts as a radian of each control that a trim finds: 1 rad, of others some ranges."""
         controls = [self.controls[i] for i in self.trimmed_controls]

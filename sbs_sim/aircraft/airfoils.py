@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from sbs_sim.aircraft.description import Rotor
@@ -31,28 +32,30 @@ def load_tables(
         A file does not exist or holds no table: one line that names the rotor.
     """
     known = {
-        (name, _aspect_ratio(rotor)): table
+        (name, *_options(rotor)): table
         for rotor, tables in zip(known_rotors, known_tables, strict=True)
         for name, table in zip(rotor.airfoil_names, tables, strict=True)
     }
     found = []
     for i, rotor in enumerate(rotors):
         for k, name in enumerate(rotor.airfoil_names):
-            section = name, _aspect_ratio(rotor)
-            if section not in known:
+            aspect_ratio, drag = _options(rotor)
+            if (name, aspect_ratio, drag) not in known:
                 key = f"rotors[{i}].outboard_airfoils.values[{k - 1}]" if k else f"rotors[{i}].airfoil"
-                others = {other: table for (other, _), table in known.items()}
-                known[section] = _read_table(key, *section, folder, others)
-        found.append(tuple(known[name, _aspect_ratio(rotor)] for name in rotor.airfoil_names))
+                others = {other: table for (other, _, added), table in known.items() if added == drag}
+                known[name, aspect_ratio, drag] = _read_table(key, name, aspect_ratio, drag, folder, others)
+        found.append(tuple(known[(name, *_options(rotor))] for name in rotor.airfoil_names))
     return tuple(found)
 
 
-def _aspect_ratio(rotor: Rotor) -> float:
-    """Aspect ratio of a rotor's blades."""
-    return rotor.radius / rotor.mean_chord
+def _options(rotor: Rotor) -> tuple[float, float]:
+    """What a table depends on beside its file: aspect ratio of the blades, and drag that is added."""
+    return rotor.radius / rotor.mean_chord, rotor.drag_increment
 
 
-def _read_table(key: str, name: str, aspect_ratio: float, folder: Path, known: dict[str, AirfoilTable]) -> AirfoilTable:
+def _read_table(
+    key: str, name: str, aspect_ratio: float, drag: float, folder: Path, known: dict[str, AirfoilTable]
+) -> AirfoilTable:
     """Table of an airfoil: the known one, if that is the same for every blade, else from the file."""
     try:
         path = find_file(name, "airfoils", ".csv", folder)
@@ -61,7 +64,8 @@ def _read_table(key: str, name: str, aspect_ratio: float, folder: Path, known: d
     if name in known and _covers_circle(path):
         return known[name]
     try:
-        return read_table(path, aspect_ratio)
+        table = read_table(path, aspect_ratio)
+        return replace(table, cd=table.cd + drag) if drag else table
     except AirfoilError as error:
         raise AirfoilError(f"{key} = {name!r}: {error}") from None
 

@@ -690,6 +690,14 @@ class Rotor(ByContent):
     )
     swashplate_phase: float = number("Phase of the swashplate against the blades", -360, 360, "deg", symbol=r"\psi_s")
     airfoil: str = string("Airfoil table: a name in config/airfoils, or a path", is_physics=False)  # its table counts
+    drag_increment: float = number(
+        "Drag that is added to all airfoil tables of the rotor: of rough surfaces, slots and trim tabs",
+        0,
+        1,
+        symbol=r"\Delta c_d",
+        default=0.0,
+        is_physics=False,  # the tables that it is added to count
+    )
     outboard_stations: Array | None = declared(
         "Where other airfoils begin, as shares of the radius from the axis, increasing",
         list_schema(number_schema(0, 1), 1, MAX_AIRFOILS),

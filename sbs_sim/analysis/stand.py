@@ -34,10 +34,10 @@ class StandProblem(TrimProblem):
         super().__init__(aircraft, fidelity)
         self._sprung = (aircraft.body.stand_free > 0.0) & (aircraft.body.stand_spring > 0.0)
         self._velocity = _hub_velocity(aircraft, condition)
-        self._controls = aircraft.held_controls
+        self._controls = aircraft.resting_controls
 
     def controls(self, unknowns: Array) -> Array:
-        """Controls that are held, 0 for the others."""
+        """Controls that are held, the others nearest to 0 in their range."""
         return self._controls
 
     def state(self, condition: TrimCondition, unknowns: Array) -> tuple[Array, Array]:

@@ -57,7 +57,8 @@ def trim(
     """Trim an aircraft.
 
     On a stand this is its deflection and the steady motion of the rotors with the controls at what the file holds them
-    at (`controls.NAME.held_deg`), else 0; a condition is a steady motion of the whole stand along locked axes.
+    at (`controls.NAME.held_deg`), else nearest to 0 in their range; a condition is a steady motion of the whole stand
+    along locked axes.
 
     Of several trims the ordinary one is found: within the ranges of the controls if there is such a one, without
     stalled rotors, on the branch of hover. A guess finds others.

@@ -289,7 +289,9 @@ class _Search:
         effects, sizes, _ = np.linalg.svd(self._theory.balance(self._condition).authority)
         if sizes[-1] > NO_AUTHORITY * sizes[0]:
             return []
-        weakest = np.abs(effects[:, -1])
+        aircraft, weakest = self._problem.aircraft, np.abs(effects[:, -1])
+        if len(aircraft.rotors) == 1 and not aircraft.drives and not aircraft.commanded_surfaces:
+            return ["a rotor alone has nothing against its torque, so it does not fly: body.stand holds its hub"]
         if weakest.max() < MOSTLY:
             return ["the controls do not set lift, rolling, pitching and yawing moment apart from each other"]
         return [f"no control sets the {BALANCES[int(np.argmax(weakest))]}"]

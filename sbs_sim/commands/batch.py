@@ -120,10 +120,12 @@ def _print_batch(batch: "Batch") -> None:
     """Percentiles at the start and at the end, and the flights that ended before."""
     from sbs_sim.analysis.batch import percentiles
     from sbs_sim.analysis.monte_carlo import SHARES, quantities
+    from sbs_sim.output.units import counted
     from sbs_sim.output.warnings_text import joined
 
     whole = len(batch.cases) - len(batch.failed)
-    print(f"{len(batch.cases)} flights of {batch.cases[0].aircraft.name}, {whole} of them over {batch.time[-1]:g} s")
+    flights = counted(len(batch.cases), "flight")
+    print(f"{flights} of {batch.cases[0].aircraft.name}, {whole} of them over {batch.time[-1]:g} s")
     rows = []
     for name, values in quantities(batch).items() if whole else ():
         found = percentiles(values, SHARES)
@@ -131,7 +133,7 @@ def _print_batch(batch: "Batch") -> None:
     if rows:
         print_table(["", "start, 50 %", *(f"end, {share:g} %" for share in SHARES)], rows)
     for text, count in Counter(line for lines in batch.warnings for line in joined(lines)).most_common():
-        print(f"{OUTSIDE} in {count} flights: {text}")
+        print(f"{OUTSIDE} in {counted(count, 'flight')}: {text}")
     for i in batch.failed[:LISTED]:
         print(f"flight {i} (seed {batch.cases[i].wind.turbulence_seed}): {batch.errors[i]}")
     if len(batch.failed) > LISTED:

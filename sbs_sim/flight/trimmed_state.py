@@ -13,7 +13,7 @@ from sbs_sim.aircraft.model_records import drive_of
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.trim_point import StandPoint, TrimPoint
 from sbs_sim.model import state as S
-from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
+from sbs_sim.model.frames import euler_to_quaternion, quaternion_to_euler, rotation_matrix
 
 Array = NDArray[np.float64]
 
@@ -37,10 +37,9 @@ def trimmed_state(
     position : array_like, shape (3,)
         NED [m].
     heading : float
-        From north to east [rad].
-        On a stand both are those of the rest, and must not be given.
+        From north to east [rad]. On a stand both are on top of those of its rest.
     wind : array_like, shape (3,)
-        Steady wind, NED [m/s]; the aircraft is trimmed relative to the air and drifts with it.
+        Steady wind, NED [m/s]; an aircraft is trimmed relative to the air and drifts with it, a stand does not.
     rotor_speed : float
         Speed of rotors that have a drive over that of the trim, 0 to 1.5; see `slowed`.
 
@@ -63,17 +62,25 @@ def trimmed_state(
             f"start: a trim with {len(point.state_names)} states: allowed is one of an aircraft with {own} blades, with"
             f" {aircraft.layout.linear_size}"
         )
-    if isinstance(point, StandPoint):
-        if np.any(position) or heading:
-            raise SimulationError("position, heading: allowed is none for a start from the rest of a stand")
-        return point.simulation_state(aircraft.layout)
     heading = checks.number("heading", heading, -4 * math.pi, 4 * math.pi, "rad", SimulationError)
+    if isinstance(point, StandPoint):
+        return _displaced(slowed(aircraft, point.simulation_state(aircraft.layout), rotor_speed), position, heading)
     state = aircraft.layout.from_linear(point.state, heading)
     state[: S.ATTITUDE] = position
     north, east, down = np.asarray(wind, dtype=float).tolist()
     to_earth = rotation_matrix(euler_to_quaternion(heading, point.pitch, point.roll))
     state[S.VELOCITY : S.RATES] += to_earth[0] * north + to_earth[1] * east + to_earth[2] * down
     return slowed(aircraft, state, rotor_speed)
+
+
+def _displaced(state: Array, position: ArrayLike, heading: float) -> Array:
+    """State of a stand that is put somewhere else, and turned about the vertical."""
+    moved = state.copy()
+    moved[: S.ATTITUDE] += np.asarray(position, dtype=np.float64)
+    if heading:
+        own, pitch, roll = quaternion_to_euler(state[S.ATTITUDE : S.VELOCITY])
+        moved[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(own + heading, pitch, roll)
+    return moved
 
 
 def standing_state(
@@ -101,7 +108,8 @@ def slowed(aircraft: Aircraft, state: Array, rotor_speed: float) -> Array:
     """Simulation state whose rotors on drives turn at a share of their speed; 0 is at rest.
 
     Flap, lag and inflow of these rotors, torque and governor are the same share of what they were: rotors at rest have
-    straight blades, no inflow, and an engine that gives no torque yet. 1 gives back every bit.
+    straight blades, no inflow, and an engine that gives no torque yet. So is the deflection of a stand. 1 gives back
+    every bit.
 
     Raises
     ------
@@ -116,6 +124,8 @@ def slowed(aircraft: Aircraft, state: Array, rotor_speed: float) -> Array:
             f"rotor_speed = {share:g}: allowed is 1 for rotors without drives, whose speed is constant"
         )
     changed, layout = state.copy(), aircraft.layout
+    if aircraft.body.is_stand:
+        _slacken(changed, share)
     for j, rotor in enumerate(aircraft.rotors):
         if drive_of(aircraft, rotor) >= 0:
             for part in (layout.flap(j), layout.flap_rate(j), layout.lag(j), layout.lag_rate(j), layout.inflow(j)):
@@ -123,3 +133,10 @@ def slowed(aircraft: Aircraft, state: Array, rotor_speed: float) -> Array:
     for i, drive in enumerate(aircraft.drives):
         changed[[layout.drive(i)[name] for name in drive.state_names]] *= share
     return changed
+
+
+def _slacken(state: Array, share: float) -> None:
+    """Leave a share of the deflection of a stand."""
+    state[: S.ATTITUDE] *= share
+    angles = np.array(quaternion_to_euler(state[S.ATTITUDE : S.VELOCITY])) * share
+    state[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(*angles.tolist())

@@ -40,6 +40,7 @@ from sbs_sim.nodes.parameters import ground_altitude
 from sbs_sim.nodes.qos import EVENT_QOS, LATCHED_QOS
 from sbs_sim.nodes.rejections import WARNING_PERIOD
 from sbs_sim.nodes.remote_pilot import RemotePilot
+from sbs_sim.output.units import counted
 
 Array = NDArray[np.float64]
 
@@ -240,7 +241,7 @@ def _check_status(status: SimulationStatus) -> None:
 
 
 def _status(status: SimulationStatus) -> Status:
-    lost = f"{status.log_dropped} messages not recorded " if status.log_dropped else ""
+    lost = f"{counted(status.log_dropped, 'message')} not recorded " if status.log_dropped else ""
     return Status(
         status.state == SimulationStatus.PLAYING,
         status.real_time_factor,

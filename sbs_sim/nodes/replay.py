@@ -24,6 +24,7 @@ from sbs_sim.nodes.signals import (
     when_interrupted,
 )
 from sbs_sim.nodes.what_if import fly_with
+from sbs_sim.output.units import counted
 from sbs_sim.recording import Log, read, recover
 from sbs_sim.recording.playback import Playback
 from sbs_sim.recording.recorded_flight import RecordedFlight, complete_until, flight_of
@@ -168,7 +169,7 @@ def _recover(path: Path, output: str) -> int:
     with progress_bar("chunk") as progress:
         found = recover(path, target, progress)
     until = "" if found.last_time is None else f" until {found.last_time:.3f} s"
-    print(f"{target}: {found.messages} messages{until}")
+    print(f"{target}: {counted(found.messages, 'message')}{until}")
     if found.complete:
         print("nothing was lost")
         return 0
@@ -200,12 +201,13 @@ def _verify(path: Path, number: int | None) -> int:
 
 def _verdict(found: Verification) -> str:
     """What became of a log that was flown again, in one line."""
+    states = counted(found.states, "state")
     if found.identical:
-        return f"identical, {found.states} states"
+        return f"identical, {states}"
     if not found.other_versions:
-        return f"different, though the versions are the same: {found.states} states"
+        return f"different, though the versions are the same: {states}"
     within = "within" if found.within_tolerance else "beyond"
-    return f"{within} the tolerance of {TOLERANCE:g} for other versions, {found.states} states"
+    return f"{within} the tolerance of {TOLERANCE:g} for other versions, {states}"
 
 
 def _flight(path: Path, number: int | None) -> RecordedFlight:

@@ -10,7 +10,6 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from std_srvs.srv import SetBool
 
@@ -19,6 +18,7 @@ from sbs_msgs.srv import EngineFailure, Reset, SetWind, Step
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import trim
+from sbs_sim.analysis.trim_problem import MIN_SPEED
 from sbs_sim.errors import SbsError, SimulationError, TrimError
 from sbs_sim.flight.contact import state_on_ground
 from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP_DEG, FREE_METHOD, METHOD, METHODS, Simulation
@@ -36,6 +36,7 @@ from sbs_sim.nodes.qos import COMMAND_QOS, SERVICE_QOS
 from sbs_sim.nodes.recorder_node import RecorderNode
 from sbs_sim.nodes.signals import note_interruptions
 from sbs_sim.nodes.simulator_outputs import SimulatorOutputs
+from sbs_sim.output.units import counted
 
 OFF = "off"
 # How long a thread keeps the interpreter while the flight waits for it [s]; the 5 ms of Python are half a tick.
@@ -176,27 +177,37 @@ class Simulator(Component):
         rotor_speed: float,
         on_ground: bool,
     ) -> tuple[Any, Any]:
-        """State and pilot controls with which a flight begins: trimmed, or with controls at rest where it stands."""
-        if not (self.aircraft.body.is_stand or on_ground):
-            point = self._trim(*condition)
-            return trimmed_state(self.aircraft, point, position, heading, wind, rotor_speed), point.controls
-        for name, value in zip(CONDITION, condition, strict=True):
-            if value != 0.0:
-                where = "on the ground" if on_ground else "on a stand"
-                raise SimulationError(f"{name} = {value:g}: allowed is 0 for an aircraft {where}")
-        low, high = np.array([control.range for control in self.aircraft.controls]).T
-        controls = np.clip(self.aircraft.held_controls, low, high)
+        """State and pilot controls with which a flight begins: those of the trim, or at rest on the ground."""
         if on_ground:
-            if position[2] != 0.0:
-                raise SimulationError(f"height = {-position[2]:g}: allowed is 0 for an aircraft on the ground")
-            return state_on_ground(self.aircraft, self._ground, position[:2], heading, rotor_speed), controls
-        return standing_state(self.aircraft, position, heading, rotor_speed), controls
+            return self._standing_on_ground(condition, position, heading, rotor_speed)
+        try:
+            point = self._trim(*condition)
+        except TrimError as error:
+            if not self.aircraft.body.is_stand or any(condition):
+                raise
+            self.get_logger().warning(f"begins with straight blades: {error}")
+            state = standing_state(self.aircraft, position, heading, rotor_speed)
+            return state, self.aircraft.resting_controls
+        return trimmed_state(self.aircraft, point, position, heading, wind, rotor_speed), point.controls
+
+    def _standing_on_ground(
+        self, condition: Sequence[float], position: Any, heading: float, rotor_speed: float
+    ) -> tuple[Any, Any]:
+        """State on the ground, and controls at rest."""
+        for name, value in zip((*CONDITION, "height"), (*condition, -position[2]), strict=True):
+            if value != 0.0:
+                raise SimulationError(f"{name} = {value:g}: allowed is 0 for an aircraft on the ground")
+        state = state_on_ground(self.aircraft, self._ground, position[:2], heading, rotor_speed)
+        return state, self.aircraft.resting_controls
 
     def _trim(self, airspeed: float, climb_rate: float, sideslip: float, turn_rate: float) -> TrimPoint:
-        """Trim that can be flown: every control within its limits."""
+        """Trim that can be flown: every control within its limits, and no rotor that hardly turns."""
         point = trim(self.aircraft, airspeed, climb_rate, sideslip, turn_rate, **self._fidelity)
         if point.beyond_limits:
             raise TrimError("this flight needs " + "; ".join(point.beyond_limits))
+        pairs = zip(self.aircraft.rotors, point.rotor_speed.tolist(), strict=True)
+        if slow := [rotor.name for rotor, speed in pairs if abs(speed) < MIN_SPEED * rotor.speed]:
+            raise TrimError(f"in this flight nothing turns {', '.join(slow)} fast enough to hold its blades")
         return point
 
     # ----------------------------------------------------------------------------------------------------- inputs
@@ -218,7 +229,7 @@ class Simulator(Component):
         def step() -> None:
             response.sim_time = self.loop.step(request.ticks)
 
-        return self.answer(response, step, f"{request.ticks} ticks", request)
+        return self.answer(response, step, counted(request.ticks, "tick"), request)
 
     def _on_reset(self, request: Reset.Request, response: Reset.Response) -> Reset.Response:
         def reset() -> None:

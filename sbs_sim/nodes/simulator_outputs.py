@@ -31,6 +31,7 @@ from sbs_sim.nodes.recorded_publisher import RecordedPublisher
 from sbs_sim.nodes.recorder_node import RecorderNode
 from sbs_sim.nodes.rejections import WARNING_PERIOD
 from sbs_sim.nodes.state_bytes import StatusBytes, states_of
+from sbs_sim.output.units import counted
 
 HEARTBEAT = 1.0  # s of wall time between status and /clock of a flight at rest
 PUBLISHING_TIMEOUT = 10.0  # s to publish the remaining reports at the end
@@ -205,10 +206,10 @@ class SimulatorOutputs:
             problems.append((DiagnosticStatus.WARN, "command timed out, holding the last one"))
         problems += [(DiagnosticStatus.WARN, f"outside the model's validity: {line}") for line in self._status.warnings]
         if self._log is not None and (self._log.fault or self._log.dropped):
-            lost = f"{self._log.dropped} messages not recorded {self._log.fault}"
+            lost = f"{counted(self._log.dropped, 'message')} not recorded {self._log.fault}"
             problems.append((DiagnosticStatus.WARN, lost.strip()))
         if report.dropped:
-            problems.append((DiagnosticStatus.WARN, f"{report.dropped} ticks not published"))
+            problems.append((DiagnosticStatus.WARN, f"{counted(report.dropped, 'tick')} not published"))
         problems += self._commands.problems()
         values = {
             "sim_time": f"{report.time:.3f}",

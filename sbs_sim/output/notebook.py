@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sbs_sim.output.units import label, shown
+from sbs_sim.output.units import RPM, counted, label, shown
 from sbs_sim.output.warnings_text import joined
 
 if TYPE_CHECKING:
@@ -52,25 +52,30 @@ def sweep_html(found: "Sweep") -> str:
     """Trims and growing modes along a sweep."""
     values, unit = found.shown
     columns = [f"{found.parameter} [{unit}]" if unit else found.parameter, "pitch [deg]", "roll [deg]"]
-    columns += [label(*control) for control in found.controls.items()] + ["power [W]", "growing modes", ""]
-    rows = [_sweep_row(value, point, len(columns) - 3) for value, point in zip(values, found.points, strict=True)]
+    columns += [label(*control) for control in found.controls.items()]
+    rotors = found["rotor_speed"].shape[1] if found.has_free_speeds else 0
+    columns += [*(f"rotor {j + 1} [rpm]" for j in range(rotors)), "power [W]", "growing modes", ""]
+    numbers = len(columns) - 3
+    rows = [_sweep_row(value, point, numbers, rotors) for value, point in zip(values, found.points, strict=True)]
     if len(rows) > MAX_ROWS:
         half = MAX_ROWS // 2
         rows = [*rows[:half], [f"… {len(rows) - 2 * half} more …", *[""] * (len(columns) - 1)], *rows[-half:]]
     failed = f", {len(found.failed)} of them without a result" if found.failed else ""
-    heading = _paragraph(f"Sweep of {found.parameter}: {len(found.points)} points{failed}")
+    heading = _paragraph(f"Sweep of {found.parameter}: {counted(len(found.points), 'point')}{failed}")
     return heading + _table(columns, rows, (len(columns) - 2, len(columns) - 1))
 
 
-def _sweep_row(value: float, point: "SweepPoint", numbers: int) -> list[str]:
-    """Cells of a point, of which so many are numbers of the trim."""
+def _sweep_row(value: float, point: "SweepPoint", numbers: int, rotors: int) -> list[str]:
+    """Cells of a point, of which so many are numbers of the trim, with the speeds of so many rotors."""
     if point.trim is None:
         return [f"{value:.6g}", *["–"] * numbers, "", point.error or ""]
     controls = zip(point.trim.controls.tolist(), point.trim.control_units, strict=True)
     angles = [*np.degrees([point.trim.pitch, point.trim.roll]), *(shown(angle, unit)[0] for angle, unit in controls)]
     growing = [mode.name for mode in point.model.modes if mode.is_growing] if point.model else []
     remarks = [*([point.error] if point.error else []), *point.trim.beyond_limits, *joined(point.warnings)]
-    cells = [*(_fixed(angle, 3) for angle in angles), _fixed(point.trim.power.sum(), 1)]
+    speeds = point.trim.rotor_speed[:rotors] * RPM
+    cells = [*(_fixed(angle, 3) for angle in angles), *(_fixed(speed, 1) for speed in speeds)]
+    cells.append(_fixed(point.trim.power.sum(), 1))
     return [f"{value:.6g}", *cells, "; ".join(growing), "; ".join(remarks)]
 
 

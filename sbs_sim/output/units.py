@@ -1,4 +1,4 @@
-"""Units in which a person reads numbers: degrees for angles, as they are for all others."""
+"""Numbers as a person reads them: degrees for angles, other units as they are; counts with their word."""
 
 from typing import Any
 
@@ -12,6 +12,11 @@ def shown(values: Any, unit: str) -> tuple[Any, str]:
     if unit.startswith("rad"):
         return np.degrees(values), unit.replace("rad", "deg", 1)
     return values, unit
+
+
+def counted(number: int, word: str) -> str:
+    """Number of things in words: "1 state", "2 states"."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
 def label(name: str, unit: str) -> str:

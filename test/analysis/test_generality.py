@@ -14,7 +14,7 @@ from sbs_sim.errors import TrimError
 SEED = 6  # of which ten aircraft have all keys
 NUMBERS = range(10)
 
-WITHOUT_TRIM = {5: "^no trim: no control sets the yawing moment"}
+WITHOUT_TRIM = {5: "^no trim: a rotor alone has nothing against its torque"}
 
 
 @functools.cache

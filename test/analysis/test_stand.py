@@ -14,7 +14,9 @@ from sbs_sim.analysis.floquet import floquet
 from sbs_sim.analysis.isolated_rotor import IsolatedRotor
 from sbs_sim.analysis.validation.hammond import eigenvalues
 from sbs_sim.errors import AircraftError, LinearizationError, SimulationError, TrimError
+from sbs_sim.flight.trimmed_state import standing_state, trimmed_state
 from sbs_sim.model import state as S
+from sbs_sim.model.frames import quaternion_to_euler
 
 RUN = Path(__file__).resolve().parents[2] / "run"
 G = 9.80665
@@ -111,6 +113,32 @@ def test_a_drive_on_a_stand_finds_its_speed():
     point = trim(craft.with_value(COLLECTIVE, 8.0))
     assert point.torque.sum() == pytest.approx(0.6 * 8.0, rel=1e-9)
     assert "Omega(1)" in linearize(craft.with_value(COLLECTIVE, 8.0)).state_names
+
+
+def test_a_stand_begins_at_its_rest_and_what_is_given_is_on_top():
+    """Deflection and heading of the rest, a place and a heading; rotors at rest leave the stand straight."""
+    data = aircraft_data()
+    data["body"]["stand"] = SPRUNG
+    engine = {"kind": "engine", "max_torque": 8.0, "throttle": 0.6}
+    craft = Aircraft.from_dict(data | {"drives": [{"rotors": ["R1"], "engine": engine}]}).with_value(COLLECTIVE, 8.0)
+    rest = trim(craft)
+    assert abs(rest.heading) > 1e-6
+    own = rest.simulation_state(craft.layout)
+    np.testing.assert_array_equal(trimmed_state(craft, rest), own)
+    moved = trimmed_state(craft, rest, position=(1.0, 2.0, 3.0), heading=0.5)
+    np.testing.assert_allclose(moved[: S.ATTITUDE], own[: S.ATTITUDE] + [1.0, 2.0, 3.0])
+    heading, pitch, roll = quaternion_to_euler(moved[S.ATTITUDE : S.VELOCITY])
+    np.testing.assert_allclose((heading, pitch, roll), (rest.heading + 0.5, rest.pitch, rest.roll), atol=1e-12)
+    straight = standing_state(craft, rotor_speed=0.0)
+    np.testing.assert_allclose(trimmed_state(craft, rest, rotor_speed=0.0)[: S.VELOCITY], straight[: S.VELOCITY])
+    raised = craft.with_values({"controls.lateral_cyclic.range_deg": [2.0, 12.0]})
+    assert trim(raised).beyond_limits == ()
+    assert trim(raised)["lateral_cyclic"] == pytest.approx(math.radians(2.0))
+
+
+def test_a_rotor_alone_is_said_to_need_a_stand():
+    with pytest.raises(TrimError, match=r"^no trim: a rotor alone .* body\.stand holds its hub"):
+        trim(build(rotors=[{}]))
 
 
 def test_what_a_stand_does_not_allow_is_refused_in_a_line(hammond, sbs, hover):

@@ -403,6 +403,7 @@ OTHER_VALUES = {
     ("rotors", 0, "blade_lag_damping"): [1.0, 0.0, 1.0],
     ("rotors", 0, "flap_rest_deg"): 2.0,
     ("rotors", 0, "induced_power_factor"): 1.15,
+    ("rotors", 0, "drag_increment"): 0.002,
     ("rotors", 0, "lag_rest_deg"): -7.0,
     ("options", "elements"): 21,
 }
@@ -414,6 +415,7 @@ OPTIONAL = {
     "blade_inertia",
     "flap_rest_deg",
     "induced_power_factor",
+    "drag_increment",
     "lag_rest_deg",
     "blade_lag_damping",
     "lag_damper",
@@ -1212,6 +1214,21 @@ def test_airfoils_along_the_blade_count_and_travel_with_the_aircraft(sbs, tmp_pa
     with pytest.raises(AircraftError) as caught:
         sbs.with_value("rotors[1].outboard_airfoils", {"stations": [0.5], "values": ["none"]})
     assert ": rotors[1].outboard_airfoils.values[0] = 'none': allowed are a file's path or" in str(caught.value)
+
+
+def test_drag_is_added_to_the_tables_of_one_rotor(sbs, tmp_path):
+    """At every angle and Reynolds number; lift and the other rotor stay, and files carry it."""
+    aircraft = sbs.with_value("rotors[0].drag_increment", 0.002)
+    (plain,), (own,), (other,) = *sbs.sections[:1], *aircraft.sections
+    np.testing.assert_allclose(own.cd - plain.cd, 0.002, rtol=0, atol=1e-15)
+    assert own.cl is plain.cl or np.array_equal(own.cl, plain.cl)
+    assert np.array_equal(other.cd, plain.cd)
+    assert aircraft.parameter_hash != sbs.parameter_hash
+    assert sbs.with_value("rotors[0].drag_increment", 0.0).parameter_hash == sbs.parameter_hash
+    data, files = aircraft.files()
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
+    assert Aircraft.from_dict(data, tmp_path).parameter_hash == aircraft.parameter_hash
 
 
 def test_another_airfoil_is_read(sbs):

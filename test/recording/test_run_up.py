@@ -45,8 +45,9 @@ def test_a_run_up_on_a_stand_and_once_more_by_the_service(tmp_path):
         client = made.client
         client.watch("rotors", RotorStateArray)
         client.next("rotors", lambda message: message.drives[0].speed > 0.97 * speed)
-        refused = client.call(Reset, "reset", airspeed=5.0)
-        assert (refused.success, refused.message) == (False, "airspeed = 5: allowed is 0 for an aircraft on a stand")
+        refused = client.call(Reset, "reset", turn_rate=1.0)
+        said = "turn_rate = 1: allowed is 0 on a stand that is free in no axis"
+        assert (refused.success, refused.message) == (False, said)
         refused = client.call(Reset, "reset", rotor_speed=2.0)
         assert refused.message == "rotor_speed = 2.0: allowed are 0 to 1.5"
         assert client.call(Reset, "reset", rotor_speed=0.5).success
@@ -56,8 +57,11 @@ def test_a_run_up_on_a_stand_and_once_more_by_the_service(tmp_path):
     assert_identical(log)
     flight = flight_of(read(log))
     places = aircraft.layout.drive(0)
-    starts = [event.state[places["Omega"]] for event in flight.events if event.state is not None]
-    np.testing.assert_allclose(starts, [0.0, 0.5 * speed], rtol=1e-15)
+    begun = [event.state for event in flight.events if event.state is not None]
+    np.testing.assert_allclose([state[places["Omega"]] for state in begun], [0.0, 0.5 * speed], rtol=1e-9)
+    rest = trim(aircraft)  # where stands begin
+    for state, share in zip(begun, (0.0, 0.5), strict=True):
+        np.testing.assert_allclose(state, trimmed_state(aircraft, rest, rotor_speed=share), rtol=1e-6, atol=1e-9)
     np.testing.assert_array_equal(flight.states[:, :13], flight.states[0, :13] * np.ones((len(flight.states), 1)))
 
 

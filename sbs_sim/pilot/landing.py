@@ -99,15 +99,16 @@ class Landing:
             self.phase = STANDING if touching > 0.0 else FLYING
             self._height = float(body[S.DOWN])
         wanted = float(body[S.DOWN]) if self._wanted is None else float(self._wanted[0][2])
-        self._firm = self._firm + elapsed if touching >= 0.5 else 0.0
+        # a soft touch rebounds: what it has lasted is forgotten half as fast
+        self._firm = self._firm + elapsed if touching >= 0.5 else max(0.0, self._firm - 0.5 * elapsed)
         if self.phase == STANDING and wanted < body[S.DOWN] - CLEARANCE:
             self.phase = LIFTING
         elif self.phase == LIFTING and touching == 0.0:
-            self.phase = FLYING
+            self.phase, self._firm = FLYING, 0.0
             heading = quaternion_to_euler(body[S.ATTITUDE : S.VELOCITY])[0]
             self._height = float(body[S.DOWN])
             self._pilot.take_over((body[: S.ATTITUDE].copy(), heading), heading, self._controls)
-        elif self.phase == FLYING and self._firm > FIRM and wanted > body[S.DOWN] - CLEARANCE:
+        elif self.phase == FLYING and touching >= 0.5 and self._firm > FIRM and wanted > body[S.DOWN] - CLEARANCE:
             self.phase = SETTLING
         elif self.phase == SETTLING and self._controls[self._collective] <= REST_COLLECTIVE:
             self.phase = STANDING

@@ -23,12 +23,13 @@ def main() -> None:
 
 
 def option_rows() -> list[Row]:
-    """Rows of a helicopter with airfoils over the Mach number, surfaces, fuselage and dampers, and of drives."""
+    """Rows of a helicopter with airfoils over the Mach number, surfaces, fuselage and dampers, interference and drives."""
     sbs = Aircraft.load("sbs")
     many = Aircraft.load("uh60a_genhel").with_value("options.elements", sbs.options.elements)
     rows = _rows("UH-60A, 10 elements of a blade", Aircraft.load("uh60a_genhel"), sbs)
     rows += _rows(f"UH-60A, {sbs.options.elements} elements of a blade", many, sbs)
     rows += [row for name, keys in PARTS.items() for row in _rows(f"  {name}", _without(many, keys), sbs)]
+    rows += _rows("sbs with interference", sbs.with_value("options.interference", "skewed_wake"), sbs)
     return rows + _rows("sbs with an electric drive", Aircraft.load(str(ELECTRIC)), sbs)
 
 

@@ -360,6 +360,11 @@ class Options:
         ("smooth", "linear"),
         default="linear",  # of files that were written before there was a choice
     )
+    interference: str = choice(
+        "Wash of the rotors on one another: none, or that of their skewed wakes",
+        ("none", "skewed_wake"),
+        default="none",
+    )
 
 
 def _mixing() -> Any:

@@ -10,6 +10,7 @@ from sbs_sim.aircraft.blade_offsets import blade_moments, inward_shift
 from sbs_sim.aircraft.commands import scheduled_controls
 from sbs_sim.aircraft.declaration import model_values
 from sbs_sim.aircraft.description import ENGINES, GROUND_EFFECTS, Body, Drive, Rotor
+from sbs_sim.aircraft.interference import records_of
 from sbs_sim.aircraft.surfaces import Parts, parts_of, slope_changes
 from sbs_sim.model import records as R
 from sbs_sim.model.airfoil import DEGREE, AirfoilTable, Grid, cell_grid, cells, common_grid
@@ -37,6 +38,7 @@ def model_of(aircraft: "Aircraft") -> R.Model:
     knots = R.aligned((len(blades), most, 1), float)
     quads = np.cumsum([0, *(-(-rotor.blades // R.QUAD) for rotor in aircraft.rotors)])
     number = 0
+    pairs, influences = records_of(aircraft)
     for j, rotor in enumerate(aircraft.rotors):
         for k in range(rotor.blades):
             _set(blades[number], _blade_values(aircraft, rotor, k, grids[j]))
@@ -61,6 +63,8 @@ def model_of(aircraft: "Aircraft") -> R.Model:
         **_schedules(aircraft),
         ground=ground_record(aircraft, aircraft.ground.altitude),
         contacts=_contacts(aircraft),
+        pairs=pairs,
+        influences=influences,
     )
 
 
@@ -181,8 +185,8 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["contact"] = aircraft.has_contact
     switches["ground_effect"] = GROUND_EFFECTS.index(aircraft.ground.effect)
     switches["teetering"] = any(rotor.is_teetering for rotor in aircraft.rotors)
-    switches["wash"] = 0
-    switches["wash"] |= switches["ground_effect"] > 0
+    switches["interference"] = aircraft.options.interference != "none"
+    switches["wash"] = (switches["ground_effect"] > 0) | (switches["interference"] > 0)
     return switches
 
 

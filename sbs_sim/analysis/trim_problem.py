@@ -100,7 +100,10 @@ class TrimProblem:
             inflow = index[self.layout.inflow(j)][: 3 if self.fidelity.cyclic_inflow else 1]
             places += list(inflow)
             equations += list(inflow)
-            owners += [j] * (len(places) - len(owners))
+            # with interference the inflow of a rotor changes the blades of all
+            has_inflow_alone = self.aircraft.options.interference == "none"
+            owners += [j] * (len(places) - len(inflow) - len(owners))
+            owners += [j if has_inflow_alone else len(self.aircraft.rotors)] * len(inflow)
         return np.array(places), np.array(equations), np.array(owners)
 
     def _equation_scales(self) -> Array:

@@ -17,6 +17,7 @@ from sbs_sim.model.dynamics import derivative
 from sbs_sim.model.integrate import RK4, STAGES, advance
 from sbs_sim.model.kernel import address
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
+from sbs_sim.model.state import BODY_SIZE, INFLOW_NAMES, LINEAR_BODY_SIZE
 from sbs_sim.model.wind import WIND_SIZE
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
 
@@ -151,6 +152,9 @@ class Engine:
         """
         outputs = len(owners) + SPECIFIC_FORCE_SIZE + R.LOAD_SIZE * self.rotors
         all_owners = np.append(owners, np.full(rigging.shape[1] - 1, self.rotors))
+        if self.model.switches["interference"][0]:  # the inflow of a rotor changes the blades of all
+            for first in self.model.rotors["inflow"] - BODY_SIZE + LINEAR_BODY_SIZE:
+                all_owners[first : first + len(INFLOW_NAMES)] = self.rotors
         found = np.zeros((len(psi), len(point), outputs))
         jacobian(
             *(self.code.derivative, self.model, point, rigging, steps, all_owners, psi, self.work, self.tick),

@@ -55,6 +55,7 @@ from sbs_sim.model.frames import quaternion_rates, rotation, shaft_down
 from sbs_sim.model.fuselage import plate_drag
 from sbs_sim.model.ground_effect import add_ground_wash
 from sbs_sim.model.inflow import INVERSE_MASS, Inflow, inflow_rates, rotor_flow
+from sbs_sim.model.interference import add_interference
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
 from sbs_sim.model.offset import (
@@ -93,6 +94,8 @@ class Aircraft(NamedTuple):
     bends: Any
     ground: Any
     contacts: Any
+    pairs: Any
+    influences: Any
 
 
 class Memory(NamedTuple):
@@ -198,6 +201,8 @@ def with_rotors(model, rotors, blades):
         bends=as_lanes(model.bends, air),
         ground=as_records(model.ground),
         contacts=as_records(model.contacts),
+        pairs=as_records(model.pairs),
+        influences=model.influences,
     )
 
 
@@ -370,6 +375,8 @@ def set_wash(aircraft, memory):
     for j in range(aircraft.rotors.shape[0]):
         for row in range(WASH_ROWS):
             memory.wash[row, j] = zeros_like(aircraft.rotors[j].radius)
+    if aircraft.switches[0].interference == 1:
+        add_interference(aircraft, memory)
 
 
 @kernel

@@ -37,15 +37,17 @@ def side_by_side(models: Sequence[Model]) -> Model:
     joined: dict[str, Any] = {
         name: _joined([getattr(model, name) for model in models]) for name in Model._fields if name not in SHARED
     }
-    shapes = [model.shapes for model in models]
-    if any(not np.array_equal(shape, shapes[0]) for shape in shapes[1:]):  # as many cells each
-        joined["shapes"] = np.concatenate(shapes)
-        for part in (joined["surfaces"], joined["fuselages"]):
-            part["first_row"] += np.arange(len(models)) * len(shapes[0])
+    for name, users in TABLES.items():
+        tables = [getattr(model, name) for model in models]
+        if any(not np.array_equal(table, tables[0]) for table in tables[1:]):
+            joined[name] = np.concatenate(tables)
+            for user in users:
+                joined[user]["first_row"] += np.cumsum([0, *map(len, tables[:-1])])
     return first._replace(**joined)
 
 
-SHARED = ("indices", "table", "shapes")
+TABLES = {"shapes": ("surfaces", "fuselages"), "influences": ("pairs",)}  # and the records that have rows in them
+SHARED = ("indices", "table", *TABLES)
 
 
 def _joined(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:

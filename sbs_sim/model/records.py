@@ -50,6 +50,7 @@ SWITCHES = {
     "teetering": INTEGER,  # 1 where a rotor is
     "wash": INTEGER,  # 1 where something adds to the inflow of a rotor, see `sbs_sim.model.dynamics.set_wash`
     "ground_effect": INTEGER,  # see `sbs_sim.model.ground_effect`
+    "interference": INTEGER,  # 1 where rotors meet the wash of one another
     "contact": INTEGER,  # 1 for an aircraft that can stand on the ground
 }
 # the ground: a plane
@@ -195,6 +196,15 @@ SCHEDULE = {
     "first": LANES,  # factor, or angle [rad], up to the first airspeed
     "target": INTEGER,  # index of the angle among the commands
     "source": INTEGER,  # of the control that the factor is of; -1 for an angle
+}
+# two rotors, of which one (the target) meets the wash of the other: see `sbs_sim.model.interference`
+PAIR = {
+    "flow_scale": LANES,  # mean induced velocity over the tip speed of the target for lambda0 of the source
+    "blade_scale": LANES,  # times kappa_i of the source over that of the target
+    "cells": LANES,  # of the table along each component of the skew
+    "first_row": LANES,  # of the table
+    "source": INTEGER,
+    "target": INTEGER,
 }
 ELEMENT = {
     "span": LANES,  # from the flap hinge [m]
@@ -395,6 +405,10 @@ class Model(NamedTuple):
     ground : structured ndarray, shape (1,)
     contacts : structured ndarray, shape (points,)
         Skids and wheels, where the aircraft stands on the ground.
+    pairs : structured ndarray, shape (pairs,)
+        Rotors that meet the wash of one another.
+    influences : ndarray, shape (cells, 16)
+        Their coefficients over the skew of the wake, see `sbs_sim.aircraft.interference`.
     """
 
     switches: NDArray[Any]
@@ -416,6 +430,8 @@ class Model(NamedTuple):
     bends: Array
     ground: NDArray[Any]
     contacts: NDArray[Any]
+    pairs: NDArray[Any]
+    influences: Array
 
 
 class Work(NamedTuple):

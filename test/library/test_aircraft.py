@@ -391,6 +391,7 @@ OTHER_VALUES = {
     ("description",): "another",
     ("options", "coupling"): "complete",
     ("options", "interpolation"): "linear",
+    ("options", "interference"): "skewed_wake",
     ("options", "hub_moment"): "complete",
     ("options", "flap_inertia"): "hinge_to_tip",
     ("rotors", 0, "name"): "another",
@@ -410,6 +411,7 @@ OTHER_VALUES = {
 OPTIONAL = {
     "speed_of_sound",
     "interpolation",
+    "interference",
     "swashplate_offset_deg",
     "schedule",
     "blade_inertia",

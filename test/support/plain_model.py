@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 from plain_ground import contact, ground_washes
+from plain_interference import all_washes
 from plain_parts import part_loads
 from scipy.interpolate import CubicHermiteSpline
 
@@ -655,18 +656,6 @@ def flat_plate_force(ac, air_velocity):
 # ------------------------------------------------------------------------------------------------------------
 
 
-class Wash(NamedTuple):
-    """What others add to the inflow of a rotor, as a part of it."""
-
-    blades: np.ndarray  # lambda0, lambdas, lambdac for the blades
-    through: float  # of other rotors, through the disc
-
-
-def all_washes(ac, inflow, hub_velocities):
-    """Return the `Wash` of every rotor."""
-    return [Wash(np.zeros(3), 0.0) for _ in ac.rotors]
-
-
 #: Castles and Gray, NACA TN 2474, Fig. 12: rate of descent and induced velocity over that of momentum theory in hover.
 CASTLES_GRAY = np.array(
     [[0, 1.1], [0.4, 1.41], [0.8, 1.8], [1.2, 2.24], [1.5, 2.5], [1.6, 2.28], [1.8, 1.68], [2, 1.37], [2.4, 0.95]]
@@ -784,7 +773,7 @@ class Instant(NamedTuple):
     pitches: list  # over rotors, over blades, of pairs: pitch at the hinge [rad] and its rate [rad/s]
     state: object  # `split_state`
     hub_velocities: list  # over rotors, relative to the air, body axes [m/s]
-    washes: list  # over rotors, see `Wash`
+    washes: list  # over rotors, see `plain_interference`
     conings: list  # over rotors, of pairs: mean flap angle [rad] and rate [rad/s]
 
 

@@ -15,6 +15,12 @@ from sbs_sim.flight.trimmed_state import trimmed_state
 ELECTRIC = Path(__file__).resolve().parent.parent / "test" / "data" / "electric.yaml"
 PARTS = {"without surfaces": ("surfaces",), "without fuselage": ("fuselage",), "with neither": ("surfaces", "fuselage")}
 
+OPTIONS: dict[str, dict[str, object]] = {
+    "measured descent": {"rotors.descent": "measured", "rotors.induced_power_factor": 1.1},
+    "tip loss by Prandtl": {"rotors.tip_loss_model": "prandtl"},
+    "oblique drag": {"rotors.profile_drag": "oblique"},
+}
+
 
 def main() -> None:
     """Print the rows."""
@@ -30,6 +36,7 @@ def option_rows() -> list[Row]:
     rows += _rows(f"UH-60A, {sbs.options.elements} elements of a blade", many, sbs)
     rows += [row for name, keys in PARTS.items() for row in _rows(f"  {name}", _without(many, keys), sbs)]
     rows += _rows("sbs with interference", sbs.with_value("options.interference", "skewed_wake"), sbs)
+    rows += [row for name, values in OPTIONS.items() for row in _rows(f"sbs, {name}", sbs.with_values(values), sbs)]
     return rows + _rows("sbs with an electric drive", Aircraft.load(str(ELECTRIC)), sbs)
 
 

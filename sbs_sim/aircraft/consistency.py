@@ -321,6 +321,13 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
     relations += [
         (rotor.duct_exit is None or rotor.duct_expansion == 0.5, "duct_expansion", "0.5, with duct.exit_area"),
     ]
+    relations += [
+        (
+            rotor.tip_loss_model == "factor" or rotor.tip_loss == 1.0,
+            "tip_loss",
+            "1, with tip_loss_model = prandtl",
+        ),
+    ]
     if rotor.descent == "measured":
         factor = f"{POWER_FACTOR:g}, with descent = measured"
         relations += [
@@ -365,6 +372,8 @@ def _offset_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
     if aircraft.options.coupling != "complete":
         return [f"options.coupling = {aircraft.options.coupling!r}: allowed with offsets of the blade is complete"]
     problems = []
+    if rotor.tip_loss_model != "factor" or rotor.profile_drag != "section":
+        problems.append("tip_loss_model, profile_drag: allowed with offsets of the blade are factor and section")
     if rotor.undersling and not rotor.is_teetering:
         problems.append(f"undersling = {rotor.undersling:g}: allowed is 0 where flap_hinge is not teetering")
     stations = np.unique(np.concatenate([[0.0, 1.0], *([] if rotor.quarter_stations is None else [_inner(rotor)])]))

@@ -693,6 +693,17 @@ class Rotor(ByContent):
     tip_loss: float = number(
         "Tip-loss factor: no lift beyond this share of the radius", 0, 1, above_minimum=True, symbol="B"
     )
+    tip_loss_model: str = choice(
+        "factor: lift as far as tip_loss; prandtl: lift of the elements times Prandtl's factor of the flow through the"
+        " disc and the number of blades, with a tip_loss of 1",
+        ("factor", "prandtl"),
+        default="factor",
+    )
+    profile_drag: str = choice(
+        "section: drag of the flow across the span; oblique: drag along the flow with its part along the span",
+        ("section", "oblique"),
+        default="section",
+    )
     swashplate_phase: float = number("Phase of the swashplate against the blades", -360, 360, "deg", symbol=r"\psi_s")
     airfoil: str = string("Airfoil table: a name in config/airfoils, or a path", is_physics=False)  # its table counts
     drag_increment: float = number(

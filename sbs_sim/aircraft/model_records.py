@@ -179,6 +179,9 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["lag_stops"] = any(rotor.lag_stops is not None for rotor in aircraft.rotors)
     switches["offsets"] = any(rotor.has_offsets for rotor in aircraft.rotors)
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
+    switches["section_options"] = any(
+        rotor.tip_loss_model == "prandtl" or rotor.profile_drag == "oblique" for rotor in aircraft.rotors
+    )
     switches["stand"] = aircraft.body.is_stand
     switches["scheduled"] = any(rotor.schedule for rotor in aircraft.rotors)
     switches["ducts"] = any(rotor.duct_exit is not None for rotor in aircraft.rotors)
@@ -251,6 +254,9 @@ def _blade_values(aircraft: "Aircraft", rotor: Rotor, number: int, grid: Grid) -
         "sin_azimuth_offset": sin_azimuth_offset,
         "alternation": (1.0 - 2.0 * (number % 2)) if rotor.blades % 2 == 0 else 0.0,
         "lead_lag": 1.0,
+        "tip_blades": rotor.blades if rotor.tip_loss_model == "prandtl" else 0,
+        "element_width": (rotor.blade_length - rotor.root_cutout) / aircraft.options.elements / rotor.radius,
+        "oblique_drag": rotor.profile_drag == "oblique",
         "first_alpha": first_angle,
         "inverse_alpha_step": inverse_step,
         "alpha_cells": columns,

@@ -315,6 +315,13 @@ def known_loads(blade, basis, loads, a_0, a_s):
 
 
 @kernel
+def with_outward_force(basis, loads, outward_force):
+    """Loads on the hub with those of a force along the span, whose line goes through both hinges."""
+    force = basis.span * outward_force
+    return ForceMoment(loads.force + force, loads.moment + cross(basis.lag_hinge + basis.flap_hinge, force))
+
+
+@kernel
 def about_cg(blade, basis, loads):
     """Body components of a six-vector about the hub centre, moved to the c.g."""
     force = to_body(blade, basis, loads.force)

@@ -48,6 +48,7 @@ from sbs_sim.model.blade import (
     to_blade,
     with_axial_damper,
     with_lag_stops,
+    with_outward_force,
 )
 from sbs_sim.model.contact import contact_load, set_contact_rates
 from sbs_sim.model.duct import duct_flow, duct_thrust, sheltered
@@ -69,6 +70,7 @@ from sbs_sim.model.offset import (
 )
 from sbs_sim.model.records import OTHERS, WASH_ROWS
 from sbs_sim.model.section import section_loads
+from sbs_sim.model.section_options import optional_loads, span_flow
 from sbs_sim.model.surfaces import fuselage_load, ramp, rotor_wash, surface_load
 from sbs_sim.model.teeter import hold_coning, lock_coning
 from sbs_sim.model.trigonometry import cosine_sine
@@ -359,7 +361,14 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
             at_hub = to_blade(blade, basis, hub.centripetal)
             set_offset_equations(aircraft, memory, r, pose, basis, motion, met, at_hub, pitch, turning)
             continue
-        loads = section_loads(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, pitch)
+        if aircraft.switches[0].section_options == 1:
+            along = span_flow(blade, basis, motion, air_velocity, induced, gradient)
+            loads, terms.outward_force = optional_loads(
+                *(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, along, pitch),
+                induced - air_velocity.z,
+            )
+        else:
+            loads = section_loads(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, pitch)
         # known acceleration of the hub in a_0, for the hinges (theory.md section 3.1) and for the hub loads (5.1)
         if aircraft.switches[0].complete_coupling == 1:
             at_hinges, at_hub = to_blade(blade, basis, hub.centripetal), to_blade(blade, basis, hub.centripetal)
@@ -521,7 +530,10 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
         moments = with_lag_stops(blade, pose, moments)
     flap, lag = hinge_columns(blade, basis)
     flap, lag = about_cg(blade, basis, flap), about_cg(blade, basis, lag)
-    known = about_cg(blade, basis, known_loads(blade, basis, loads, own.hinge + at_hub, own.slope))
+    on_hub = known_loads(blade, basis, loads, own.hinge + at_hub, own.slope)
+    if aircraft.switches[0].section_options == 1:
+        on_hub = with_outward_force(basis, on_hub, terms.outward_force)
+    known = about_cg(blade, basis, on_hub)
     inverse_lag_inertia = blade.lead_lag * moments.inverse_lag_inertia
     terms.cosine, terms.sine = pose.cosine, pose.sine
     terms.flap_column_force, terms.flap_column_moment = flap.force, flap.moment
@@ -531,7 +543,9 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
     terms.known_force, terms.known_moment = known.force, known.moment
     if aircraft.switches[0].complete_hub_moment == 0:
         terms.paper_moment, terms.flap_axis = paper_moment(blade, basis, pose, loads)
-    thrust = basis.cos_flap * loads.normal_force
+    thrust = rounded(basis.cos_flap * loads.normal_force)
+    if aircraft.switches[0].section_options == 1:
+        thrust = thrust + basis.span.z * terms.outward_force
     root_moment = blade.hinge_offset * loads.normal_force + loads.normal_moment  # Int (e_0 + s) dF_n
     inertia, inverse = locked_inertia(blade, basis), blade.inverse_second_moment
     add_to_sums(

@@ -44,6 +44,7 @@ SWITCHES = {
     "axial_dampers": INTEGER,  # 1 where a rotor has them
     "lag_stops": INTEGER,
     "offsets": INTEGER,  # 1 where quarter chord or mass of a blade are not on the pitch axis
+    "section_options": INTEGER,  # 1 where a rotor has Prandtl's tip loss or oblique drag
     "stand": INTEGER,
     "scheduled": INTEGER,  # 1 where shares in swashplate angles change with the airspeed
     "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
@@ -153,6 +154,9 @@ BLADE = {
     "sin_azimuth_offset": LANES,
     "alternation": LANES,  # of the differential coordinate: +1, -1 from blade to blade, 0 where there is none
     "lead_lag": LANES,  # 1, or 0 where the blade does not lag and for what fills up a quad
+    "tip_blades": LANES,  # N_b of a rotor with Prandtl's tip loss, else 0
+    "element_width": LANES,  # over R
+    "oblique_drag": LANES,  # 1 for drag along the local flow, the one along the span included
     "first_alpha": LANES,  # of the airfoil table [rad]
     "inverse_alpha_step": LANES,
     "alpha_cells": LANES,  # cells of the table along the angle
@@ -293,6 +297,7 @@ TERMS = {
     "u_p_hinge": LANES,
     "u_p_slope": LANES,
     "pitch": LANES,
+    "outward_force": LANES,  # along the span, of oblique drag
 }
 # of a blade with offsets, beside TERMS, see `sbs_sim.model.offset`; c_beta, Q_beta and A_1 are without what lag takes
 PITCHING = {
@@ -317,7 +322,7 @@ PITCH_SUMS = {
     "locked_moment": VECTOR,
     "locked_inertia": LANES,
 }
-STRIP = {"airspeed": LANES, "number": LANES, "fraction": LANES, "row": LANES}
+STRIP = {"airspeed": LANES, "number": LANES, "fraction": LANES, "row": LANES, "tip_factor": LANES}
 ACCELERATION = {"specific_force": VECTOR, "angular": VECTOR}  # a_g and om', body axes
 LOADS = {"thrust": LANES, "torque": LANES, "force": VECTOR, "moment": VECTOR}  # body axes, about the hub centre
 THRUST, TORQUE, FORCE, MOMENT = 0, 1, 2, 5  # the same as columns

@@ -67,7 +67,7 @@ def section_loads(air, blade, elements, knots, table, strip, flow, pitch):
     AirLoads
     """
     for i in range(elements.shape[0]):
-        _find_section(blade, elements[i], knots, strip[i], flow, pitch)
+        find_section(blade, elements[i], knots, strip[i], flow, pitch)
     normal_force = forward_force = normal_moment = forward_moment = zeros_like(pitch)
     for i in range(elements.shape[0]):
         element, section = elements[i], strip[i]
@@ -88,7 +88,7 @@ def section_loads(air, blade, elements, knots, table, strip, flow, pitch):
 
 
 @kernel
-def _find_section(blade, element, knots, section, flow, pitch):
+def find_section(blade, element, knots, section, flow, pitch):
     """Set airspeed, Reynolds or Mach number and cell of the airfoil table of one element, eq. (4.4)."""
     u_t = flow.u_t_hinge + flow.u_t_slope * element.span
     u_p = flow.u_p_hinge + flow.u_p_slope * element.span

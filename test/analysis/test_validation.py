@@ -108,7 +108,7 @@ def test_the_eigenvalues_of_the_inflow_are_the_closed_form(report):
 def test_hover_of_the_model_rotor(report):
     """The least that any blade-element model with momentum inflow must do on these tests."""
     case = next(case for case in report.cases if case.name == "castles_gray")
-    thrust = [row for row in case.rows if row.quantity == "C_T"]
+    thrust = [row for row in case.rows if row.quantity == "C_T" and "losses" not in row.condition]
     assert sum(row.verdict == MET for row in thrust) >= len(thrust) - 2
     median, _ = spread(row for row in thrust if row.published > 0.001)
     assert median < 0.06
@@ -130,11 +130,12 @@ def test_thrust_in_hover_hangs_on_the_solidity_and_not_on_the_number_of_blades()
 
 def test_losses_bring_the_thrust_of_two_blades_nearer(report):
     case = next(case for case in report.cases if case.name == "caradonna_tung")
-    ideal, lossy = case.rows[::2], case.rows[1::2]
-    assert all(
-        abs(with_loss.difference) < 0.5 * abs(row.difference) for row, with_loss in zip(ideal, lossy, strict=True)
-    )
-    assert spread(lossy)[0] < 0.12
+    ideal, lossy, prandtl = case.rows[::3], case.rows[1::3], case.rows[2::3]
+    for losses in (lossy, prandtl):
+        assert all(
+            abs(with_loss.difference) < 0.5 * abs(row.difference) for row, with_loss in zip(ideal, losses, strict=True)
+        )
+        assert spread(losses)[0] < 0.12
 
 
 def test_ground_resonance_is_that_of_the_equations_of_the_plane(report):

@@ -380,7 +380,7 @@ def schema_leaves(schema, path=()):
 ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage", "flap_hinge", "schedule")
 ELSEWHERE += ("ground", "contact_points")
 ELSEWHERE += ("quarter_chord", "chordwise_cg", "undersling")
-ELSEWHERE += ("descent",)
+ELSEWHERE += ("descent", "tip_loss_model", "profile_drag")
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)

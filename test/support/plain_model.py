@@ -596,8 +596,15 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
         )
         lifting_edge = rotor.tip_loss * rotor.radius - rotor.hinge_offset
         cl = cl * np.clip((lifting_edge - inner) / ds, 0.0, 1.0)
-        pressure = 0.5 * air.air_density * chord * speed * ds
-        force = pressure * ((cl * u_t - cd * u_p) * blade.n - (cl * u_p + cd * u_t) * blade.t)
+        if rotor.tip_loss_model == "prandtl":
+            through = blade_inflow_speed(rotor) * rotor.radius * lambda0 + blade.u @ air_velocity_hub
+            points = rotor.hinge_offset + s + ds / np.sqrt(12) * np.array([-1.0, 1.0])  # Gauss
+            cl = cl * prandtl(rotor, points / rotor.radius, through / (rotor.speed * rotor.radius)).mean()
+        u_r = velocity @ blade.d + induced * np.sin(blade.flap) if rotor.profile_drag == "oblique" else 0.0
+        pressure = 0.5 * air.air_density * chord * ds
+        force = pressure * speed * cl * (u_t * blade.n - u_p * blade.t)
+        oblique = np.hypot(speed, u_r)
+        force = force - pressure * oblique * cd * (u_p * blade.n + u_t * blade.t + u_r * blade.d)
         loads.append((s, force))
     return loads
 
@@ -643,6 +650,12 @@ def swept_force(ac, blade, inner, outer, pitch, velocity):
     cl = cl * np.clip((rotor.tip_loss * rotor.radius - rotor.hinge_offset - inner) / ds, 0.0, 1.0)
     pressure = 0.5 * air.air_density * chord * speed * ds
     return pressure * ((cl * u_across - cd * u_up) * up - (cl * u_up + cd * u_across) * across)
+
+
+def prandtl(rotor, share, inflow):
+    """Prandtl's tip loss at shares of the radius, for a flow through the disc over the tip speed."""
+    distance = 2 * np.pi * abs(inflow) / np.sqrt(1 + inflow**2) / rotor.blades  # of the vortex sheets
+    return 2 / np.pi * np.arccos(np.exp(-np.pi * (1 - share) / distance))
 
 
 def flat_plate_force(ac, air_velocity):
@@ -1311,6 +1324,8 @@ def table6_aircraft(environment=None, body=None, options=None, rotors=None):
         "twist_tip": 0.0,
         "root_cutout": 0.0,
         "tip_loss": 1.0,
+        "tip_loss_model": "factor",
+        "profile_drag": "section",
         "swashplate_phase": np.radians(-72.0),
         "airfoil": "smooth",
         "duct_expansion": 0.5,

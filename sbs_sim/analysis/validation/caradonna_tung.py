@@ -29,13 +29,16 @@ def case() -> Case:
             ideal, lossy = hover(float(speed), collective), with_losses(float(speed), collective)
             rows.append(compared("C_T", f"{where}, without losses", thrust, ideal.thrust_coefficient, "1"))
             rows.append(compared("C_T", f"{where}, with losses", thrust, lossy.thrust_coefficient, "1", AIM))
+            few = with_prandtl(float(speed), collective).thrust_coefficient
+            rows.append(compared("C_T", f"{where}, with Prandtl's tip loss", thrust, few, "1"))
     return Case(
         name="caradonna_tung",
         title="Hover of the Caradonna-Tung model rotor",
         source=published["source"],
         statement="Aircraft caradonna_tung, its rotor alone in hover at the collective of each point. Once with the"
         " options of all cases; once with losses: induced power factor 1.15, tip loss B = 1 - sqrt(C_T) / N_b with the"
-        " two blades of the report (J. G. Leishman, Principles of Helicopter Aerodynamics, chapters 2 and 3).",
+        " two blades of the report (J. G. Leishman, Principles of Helicopter Aerodynamics, chapters 2 and 3). Once with"
+        " tip_loss_model: prandtl and the same induced power factor.",
         substitutes=(
             "Blades: springs of 1e5 N m/rad hold them within 0.1 deg of the precone; their mass is chosen. Stiffer"
             " springs change the thrust by 0.01 %.",
@@ -51,6 +54,17 @@ def hover(speed: float, collective: float, tip_loss: float = 1.0, induced_power_
         "rotors.speed_rpm": speed,
         "rotors.tip_loss": tip_loss,
         "rotors.induced_power_factor": induced_power_factor,
+    }
+    rotor = IsolatedRotor(craft("caradonna_tung").with_values(values), HOVER)
+    return rotor.steady((math.radians(collective), 0.0, 0.0))
+
+
+def with_prandtl(speed: float, collective: float) -> RotorPoint:
+    """The same with the induced power factor and Prandtl's tip loss."""
+    values = {
+        "rotors.speed_rpm": speed,
+        "rotors.tip_loss_model": "prandtl",
+        "rotors.induced_power_factor": data("caradonna_tung")["induced_power_factor"],
     }
     rotor = IsolatedRotor(craft("caradonna_tung").with_values(values), HOVER)
     return rotor.steady((math.radians(collective), 0.0, 0.0))

@@ -277,3 +277,18 @@ def test_undamped_lag_grows_on_the_skids():
             assert found == pytest.approx(rotor.speed * (1.0 - math.sqrt(static)), rel=0.06), "Omega less that of lag"
     assert growth[0.0] > 0.2
     assert growth[0.022] < -0.2
+
+
+def test_rotors_run_up_from_rest_on_the_skids():
+    """A drive brings two rotors to speed; their torques cancel, so that the aircraft stays where it stands."""
+    data = aircraft_data(options={"elements": 6}, every_rotor={"lag_spring": 60.0, "lag_damping": 0.3})
+    data["ground"] = {"contact": "contact", "altitude": 0.0}
+    engine, governor = {"kind": "engine", "max_torque": 16.0, "lag": 0.05}, {"integral_gain": 2.0}
+    data["drives"] = [{"rotors": ["R1", "R2"], "engine": engine, "governor": {"proportional_gain": 5.0} | governor}]
+    aircraft = Aircraft.from_dict(data)
+    start = state_on_ground(aircraft, 0.0, (1.0, 2.0), 0.5, rotor_speed=0.0)
+    flight = simulate(aircraft, start, STILL, 3.0)
+    assert flight["Omega(1)"][0] == 0.0
+    assert flight["Omega(1)"][-1] > 0.98 * aircraft.drive_speed(0)
+    np.testing.assert_allclose(flight["state"][:, :7] - start[:7], 0.0, atol=1e-4)
+    assert flight["contact_force"][-1, :, 2].sum() == pytest.approx(-MASS * G, rel=1e-2)

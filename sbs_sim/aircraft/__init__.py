@@ -367,6 +367,12 @@ class Aircraft(Description):
                 found[j, SWASHPLATE_NAMES.index(entry.angle)] += share * controls.get(entry.control, 1.0)
         return found
 
+    @property
+    def rotor_span(self) -> float:
+        """Distance across from tip to tip of the rotors, their discs level [m]."""
+        sides = [(rotor.hub[1] - rotor.radius, rotor.hub[1] + rotor.radius) for rotor in self.rotors]
+        return float(max(right for _, right in sides) - min(left for left, _ in sides))
+
     @cached_property
     def control_names(self) -> tuple[str, ...]:
         """Names of the pilot controls."""

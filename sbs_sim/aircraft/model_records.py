@@ -415,6 +415,7 @@ def _state_indices(aircraft: "Aircraft", quads: NDArray[np.int64]) -> R.StateInd
         azimuth=number.astype(np.int64),
         swash=(3 * number + np.arange(3)[:, None]).astype(np.int64),
         inflow=(inflow + np.arange(3)[:, None]).astype(np.int64),
+        gust=(3 + R.GUST_ROWS * number + np.arange(R.GUST_ROWS)[:, None]).astype(np.int64),
         **found,
     )
 

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.model import records as R
+from sbs_sim.model.air import joined_spaces
+from sbs_sim.model.air_rows import air_rows
 from sbs_sim.model.average import averaged_derivative
 from sbs_sim.model.drive import driven_derivative
 from sbs_sim.model.dynamics import derivative
@@ -18,7 +20,7 @@ from sbs_sim.model.integrate import RK4, STAGES, advance
 from sbs_sim.model.kernel import address
 from sbs_sim.model.linear import SPECIFIC_FORCE_SIZE, jacobian
 from sbs_sim.model.state import BODY_SIZE, INFLOW_NAMES, LINEAR_BODY_SIZE
-from sbs_sim.model.wind import WIND_SIZE
+from sbs_sim.model.wind_columns import WIND_SIZE
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
 
 Array = NDArray[np.float64]
@@ -95,7 +97,21 @@ class Engine:
             exponential = R.make_exponential([], [[]] * n, width)
         self.tick = R.make_tick(self.work, int(STAGES[method]), exponential)
         self.size, self.n = self.tick.stage.shape
+        self._plain_wind, self._plain_space = self.tick.wind, self.tick.space
         self.rotors = len(self.tick.psi)
+
+    def set_space(self, spaces: Sequence[R.Space | None]) -> None:
+        """Fly through air that is not the same everywhere: of each flight, all or none; the last is for the others."""
+        if spaces[0] is None:
+            self.tick = self.tick._replace(wind=self._plain_wind, space=self._plain_space)
+            return
+        space = joined_spaces(self.model, [one for one in spaces if one is not None], self.n)
+        self.tick = self.tick._replace(wind=self.memory(air_rows(self.model)), space=space)
+
+    @property
+    def air_rows(self) -> int:
+        """Rows of the air, see `sbs_sim.model.dynamics.derivative`."""
+        return len(self.tick.wind)
 
     @property
     def code(self) -> Code:

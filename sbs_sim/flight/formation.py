@@ -16,6 +16,7 @@ from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.records import Rows
 from sbs_sim.flight.rotor_matrices import arranged
 from sbs_sim.model import state as S
+from sbs_sim.model.air_rows import CG_ROWS
 from sbs_sim.model.fly import fly
 from sbs_sim.model.frames import down_of
 from sbs_sim.model.integrate import FLYING
@@ -131,16 +132,17 @@ class Formation:
         states, forces = engine.memory(len(recorded), engine.size), engine.memory(len(recorded), 3)
         loads = engine.memory(len(recorded), LOAD_SIZE * engine.rotors)
         working = engine.memory(len(watched), engine.rotors, WORKING_SIZE)
+        air = self._air([plan.wind for plan in plans])
         fly(
             *(code.advance, code.derivative, code.working_state, engine.model, x, self._start, step),
             *(first.steps_per_tick, first.step_size, first.method, self._bounds, engine.work, engine.tick),
             *(self._failed, engine.lanes([angles.reshape(count, -1) for angles in swashplates])),
             *(engine.lanes([plan.air for plan in plans]), ticks, _first(recorded, count), every, loaded),
-            *(engine.lanes([plan.azimuth for plan in plans]), engine.lanes([plan.wind for plan in plans])),
+            *(engine.lanes([plan.azimuth for plan in plans]), air),
             *(states, forces, loads, _first(watched, count), first.watch),
             *(
                 engine.lanes([plan.watched_azimuth for plan in plans]),
-                engine.lanes([plan.watched_wind for plan in plans]),
+                self._air([plan.watched_wind for plan in plans]),
             ),
             working,
         )
@@ -150,6 +152,8 @@ class Formation:
             ticks_flown -= one.step // one.steps_per_tick
             if flew[lane]:
                 one.take_over(end, x[:, lane].copy(), plan.air[ticks], angles[-1].copy())
+            if engine.air_rows > CG_ROWS and loaded:
+                plan = replace(plan, wind=air[:, :CG_ROWS, lane].copy())
             rows = _rows(one, plan, angles, states[..., lane], forces[..., lane], loads[..., lane])
             rows = replace(rows, acceleration=rows.acceleration + _gravity(one, rows.state)) if loaded else rows
             found.append(
@@ -162,6 +166,12 @@ class Formation:
                 )
             )
         return found
+
+    def _air(self, winds: Sequence[Array]) -> Array:
+        """Velocity of the air at the c.g., (k, 3) of each flight, with the rows that depend on its place behind it."""
+        rows = self._engine.memory(len(winds[0]), self._engine.air_rows)
+        rows[:, :CG_ROWS] = self._engine.lanes(winds)
+        return rows
 
     def retire(self, lane: int) -> None:
         """Fly one of the flights no further."""
@@ -180,7 +190,9 @@ def _engine(simulations: Sequence[Simulation]) -> Engine:
     """What flies flights in the lanes; what is missing are copies of the last."""
     filled = [*simulations, *[simulations[-1]] * (lane_count() - len(simulations))]
     model, matrices = side_by_side([one.model for one in filled]), arranged([one.rotor_matrices for one in filled])
-    return Engine(model, filled[0].method, matrices)
+    engine = Engine(model, filled[0].method, matrices)
+    engine.set_space([one.space for one in filled])
+    return engine
 
 
 def _first(ticks: NDArray[np.int64], otherwise: int) -> int:

@@ -25,9 +25,11 @@ from sbs_sim.flight.formation import Flown, Formation
 from sbs_sim.flight.records import Event, Snapshot
 from sbs_sim.flight.rotor_matrices import RotorMatrices, arranged, rotor_matrices
 from sbs_sim.model import state as S
+from sbs_sim.model.air import air_in_space
 from sbs_sim.model.frames import down_of
 from sbs_sim.model.ground import lowest_point
 from sbs_sim.model.integrate import ETD, FLYING, PARTITIONED, RK4, TSIT5, advance, azimuths_at
+from sbs_sim.model.records import Space
 from sbs_sim.model.solve import length
 from sbs_sim.model.wind import Wind, WindField, winds_at
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
@@ -113,9 +115,7 @@ class Simulation:
         lead_lag = checks.flag("lead_lag", lead_lag, SimulationError)
         cyclic_inflow = checks.flag("cyclic_inflow", cyclic_inflow, SimulationError)
         method = chosen_method(aircraft, method)
-        if ground_altitude is None:
-            ground_altitude = -math.inf if aircraft.ground.altitude is None else aircraft.ground.altitude
-        ground = checks.number("ground_altitude", ground_altitude, -math.inf, PLAUSIBLE_POSITION, "m", SimulationError)
+        ground = ground_of(aircraft, ground_altitude)
         self.options: dict[str, Any] = {
             "tick": tick,
             "azimuth_step": azimuth_step,
@@ -156,7 +156,9 @@ class Simulation:
         """What flies this aircraft alone."""
         options = self.options["lead_lag"], self.options["cyclic_inflow"]
         model = self.aircraft.arranged(*options, "blades")._replace(ground=self.ground)
-        return Engine(model, self.method, arranged([self.rotor_matrices]))
+        engine = Engine(model, self.method, arranged([self.rotor_matrices]))
+        engine.set_space([self.space])
+        return engine
 
     @property
     def rotor_matrices(self) -> RotorMatrices | None:
@@ -175,6 +177,11 @@ class Simulation:
         """The wind in force."""
         return self._field.wind
 
+    @property
+    def space(self) -> Space | None:
+        """What of the air in force is not the same everywhere."""
+        return self._field.space
+
     def beginning(self) -> Event:
         """The present as the start of a flight."""
         swashplate, state = self.swashplate.copy(), self.state.copy()
@@ -191,7 +198,7 @@ class Simulation:
         checks.integer("wind_step", start.wind_step, 0, start.step, SimulationError)
         checks.integer("wind_ticks", start.wind_ticks, 0, MAX_WIND_TICKS, SimulationError)
         self.step, self._wind_step = start.step, start.wind_step
-        self._field = WindField(self.wind, start.wind_step * self.step_size, self.tick)
+        self._set_field(WindField(self.wind, start.wind_step * self.step_size, self.tick, self._level))
         self._air = self._field.tick_number(max(1, start.wind_ticks))
 
     def act(self, event: Event) -> None:
@@ -273,8 +280,19 @@ class Simulation:
         """Set the wind from the next tick on; gust delays count from now."""
         checks.instance("wind", wind, Wind, SimulationError)
         self._wind_step = self.step
-        self._field = WindField(wind, self.time, self.tick)
+        self._set_field(WindField(wind, self.time, self.tick, self._level))
         self._air = self._field.next_tick()
+
+    def _set_field(self, field: WindField) -> None:
+        """Fly through the air of a wind from now on."""
+        self._field = field
+        if "engine" in self.__dict__:  # it has been made
+            self.engine.set_space([self.space])
+
+    @property
+    def _level(self) -> float:
+        """Height of the ground above the origin [m], from which heights count; that of the origin without a ground."""
+        return ground_level(self.options["ground_altitude"])
 
     def reset(self, state: ArrayLike, swashplate: ArrayLike) -> None:
         """Put the aircraft elsewhere; time, azimuths and wind go on."""
@@ -364,7 +382,7 @@ class Simulation:
         return np.concatenate([self._air[np.newaxis], self._field.next_ticks(ticks)])
 
     def air_at(self, steps: NDArray[np.int64], air: Array) -> Array:
-        """Velocity of the air at the beginnings of ticks, NED [m/s], shape (n, 3)."""
+        """Velocity of the air at the beginnings of ticks, NED [m/s], shape (n, 3), but for what depends on a place."""
         velocities = np.zeros((len(steps), 3, 1))
         times = np.multiply(steps, self.step_size, dtype=float)
         winds_at(np.ascontiguousarray(air)[..., np.newaxis], times, self.model.rotors, velocities)
@@ -380,10 +398,14 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """The present instant, with loads and accelerations under the swashplate angles now in force."""
         engine, now = self.engine, np.array([self.step])
-        azimuth, air = self.azimuths(now)[0], self.air_at(now, self._air[np.newaxis])[0]
+        azimuth, air = self.azimuths(now)[0], engine.memory(engine.air_rows)
+        air[:3, 0] = self.air_at(now, self._air[np.newaxis])[0]
+        if self.space is not None:
+            wind = _single(self._air)
+            air_in_space(engine.model, _single(self.state), wind, self.time, engine.tick.space, air)
         working = engine.memory(engine.rotors, WORKING_SIZE)
         engine.derivative(
-            *(engine.model, _single(self.state), _single(self.swashplate), _single(azimuth), _single(air)),
+            *(engine.model, _single(self.state), _single(self.swashplate), _single(azimuth), air),
             *(engine.work, engine.tick.slopes[0], True),
         )
         working_state(engine.model, engine.work, working)
@@ -397,10 +419,28 @@ class Simulation:
             swashplate=self.swashplate.copy(),
             azimuth=self.aircraft.turned(azimuth, self.state),
             loads=engine.work.load_rows.reshape(engine.rotors, -1).copy(),
-            wind=air,
+            wind=air[:3, 0].copy(),
             working=working[..., 0],
             contact=None if contact is None else contact[0],
         )
+
+
+def ground_of(aircraft: Aircraft, ground_altitude: float | None) -> float:
+    """Height of the ground above the origin [m]: what is given, or that of the aircraft file; -inf is none.
+
+    Raises
+    ------
+    SimulationError
+        It is out of range.
+    """
+    if ground_altitude is None:
+        ground_altitude = -math.inf if aircraft.ground.altitude is None else aircraft.ground.altitude
+    return checks.number("ground_altitude", ground_altitude, -math.inf, PLAUSIBLE_POSITION, "m", SimulationError)
+
+
+def ground_level(ground_altitude: float) -> float:
+    """Height above the origin from which heights count [m]: that of the ground, 0 where there is none."""
+    return ground_altitude if math.isfinite(ground_altitude) else 0.0
 
 
 def chosen_method(aircraft: Aircraft, method: str) -> str:

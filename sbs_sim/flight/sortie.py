@@ -20,7 +20,7 @@ from sbs_sim.flight.formation import Flown, Formation
 from sbs_sim.flight.history import History, named_histories
 from sbs_sim.flight.power_balance import check_balance, named_balance, power_balance
 from sbs_sim.flight.records import Rows
-from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.simulation import Simulation, ground_level, ground_of
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight.validity import flight_warnings
@@ -86,7 +86,14 @@ class Sortie:
         actuators = checks.flag("actuators", actuators, SimulationError)
         air = Wind() if wind is None else wind
         checks.instance("wind", air, Wind, SimulationError)
-        state = trimmed_state(aircraft, start, wind=air.velocity) if isinstance(start, TrimPoint) else start
+        if balanced and air.is_local:
+            raise SimulationError("outputs: 'power_balance': allowed is air that is the same everywhere")
+        state: ArrayLike
+        if isinstance(start, TrimPoint):
+            ground = ground_of(aircraft, options.get("ground_altitude"))
+            state = trimmed_state(aircraft, start, wind=air.velocity_at(-ground_level(ground)))
+        else:
+            state = start
         initial = start.swashplate if isinstance(start, TrimPoint) else None
         pilot_command = command(aircraft, controls)
         self._pilot = (Mixed if actuators else Direct)(aircraft, pilot_command, initial)
@@ -199,7 +206,7 @@ def structure(simulation: Simulation) -> Any:
     drives = *of_rotors, *(model.drives[name] for name in ("engine", "free_wheel", "command_index"))
     return (
         *(blades, aircraft.options, sections, simulation.steps_per_tick, simulation.method),
-        *(simulation.tick, simulation.step, model.switches.tobytes()),
+        *(simulation.tick, simulation.step, simulation.space is None, model.switches.tobytes()),
         *(aircraft.layout.drives, *(part.tobytes() for part in drives), *_integers(model)),
     )
 

@@ -31,6 +31,15 @@ from sbs_sim.lanes import (
     zeros_like,
 )
 from sbs_sim.model import state as S
+from sbs_sim.model.air_rows import (
+    AT_HUB,
+    gust_of_blade,
+    gust_of_part,
+    gust_of_rotor,
+    in_space,
+    offset_with_gust_gradients,
+    with_gust_gradients,
+)
 from sbs_sim.model.blade import (
     ForceMoment,
     HingeMoments,
@@ -136,6 +145,8 @@ class Flight(NamedTuple):
         U [m/s] and om [rad/s], body axes.
     gravity : Vector
         Body axes [m/s^2].
+    air : lanes, shape (3,) or (air_rows(...),)
+        Velocity of the air, see `derivative`.
     """
 
     to_earth: Any
@@ -143,6 +154,7 @@ class Flight(NamedTuple):
     velocity: Any
     omega: Any
     gravity: Any
+    air: Any
 
 
 @entry
@@ -159,8 +171,9 @@ def derivative(model, x, swash, psi, wind, work, dx, with_loads):
         see `sbs_sim.Aircraft.mix`.
     psi : ndarray, shape (n_rotors, n)
         Azimuth of the first blade of each rotor, 0 aft, growing with the rotation [rad].
-    wind : ndarray, shape (3, n)
-        Velocity of the air over ground, NED [m/s].
+    wind : ndarray, shape (3, n), or (air_rows(...), n)
+        Velocity of the air over ground at the c.g., NED [m/s]; behind it what differs at the rotors and at the parts
+        of the body where the air is not the same everywhere, see `sbs_sim.model.air`.
     work : Work
         `work.acceleration` holds the specific force of the c.g. [m/s^2] and om' [rad/s^2] afterwards.
     dx : ndarray, shape (size, n)
@@ -299,7 +312,7 @@ def body_motion(aircraft, x, wind):
     to_earth = rotation(S.attitude_at(x))
     velocity, omega = S.vector_at(x, S.VELOCITY), S.vector_at(x, S.RATES)
     air_velocity = velocity - transposed(to_earth) @ Vector(wind[0], wind[1], wind[2])
-    return Flight(to_earth, air_velocity, velocity, omega, to_earth.z * aircraft.air[0].gravity)
+    return Flight(to_earth, air_velocity, velocity, omega, to_earth.z * aircraft.air[0].gravity, wind)
 
 
 @kernel
@@ -346,9 +359,13 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
         motion = blade_motion(blade, basis, pose, hub.omega)
         induced, gradient = induced_velocity(aircraft, memory, blade, pose)
         air_velocity = hub.air_velocity
+        if in_space(flight.air):
+            air_velocity = air_velocity - gust_of_blade(aircraft, flight.air, blade, AT_HUB)
         if aircraft.switches[0].ducts == 1:
             air_velocity = sheltered(blade.duct_turning, air_velocity)
         flow = section_flow(blade, basis, motion, air_velocity, induced, gradient)
+        if in_space(flight.air):
+            flow = with_gust_gradients(aircraft, flight.air, blade, basis, flow)
         pitch = blade_pitch(aircraft, blade, pose, swash)
         terms.u_t_hinge, terms.u_t_slope = flow.u_t_hinge, flow.u_t_slope
         terms.u_p_hinge, terms.u_p_slope = flow.u_p_hinge, flow.u_p_slope
@@ -357,6 +374,8 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
         if aircraft.switches[0].offsets == 1:
             turning = pitch_motion(aircraft, blade, pose, swash)
             turned = offset_flow(blade, basis, motion, turning.rate, air_velocity, induced, gradient)
+            if in_space(flight.air):
+                turned = offset_with_gust_gradients(aircraft, flight.air, blade, basis, turned)
             met = offset_air_loads(air, blade, basis, elements, aircraft.knots[r], aircraft.table, turned, pitch)
             at_hub = to_blade(blade, basis, hub.centripetal)
             set_offset_equations(aircraft, memory, r, pose, basis, motion, met, at_hub, pitch, turning)
@@ -635,6 +654,8 @@ def set_hub_velocities(aircraft, memory, flight):
     """Set the velocity of every hub relative to the air, hub axes."""
     for j in range(aircraft.rotors.shape[0]):
         memory.flow[j].velocity = hub_motion(aircraft.rotors[j], flight).air_velocity
+        if in_space(flight.air):
+            memory.flow[j].velocity = memory.flow[j].velocity - gust_of_rotor(flight.air, j)
 
 
 @kernel
@@ -650,11 +671,15 @@ def body_loads(aircraft, memory, flight, swash):
     for i in range(aircraft.surfaces.shape[0]):
         surface, ramps = aircraft.surfaces[i], aircraft.ramps[i]
         wash = wash_at(aircraft, memory, surface, ramps)
+        if in_space(flight.air):
+            wash = wash - gust_of_part(aircraft, flight.air, i)
         load = surface_load(air.density, surface, ramps, aircraft.shapes, swash, flight.air_velocity, omega, wash)
         force, moment = force + load.force, moment + load.moment
     for i in range(aircraft.fuselages.shape[0]):
         fuselage, ramps = aircraft.fuselages[i], aircraft.ramps[aircraft.surfaces.shape[0] + i]
         wash = wash_at(aircraft, memory, fuselage, ramps)
+        if in_space(flight.air):
+            wash = wash - gust_of_part(aircraft, flight.air, aircraft.surfaces.shape[0] + i)
         load = fuselage_load(air.density, fuselage, aircraft.shapes, flight.air_velocity, omega, wash)
         force, moment = force + load.force, moment + load.moment
     if aircraft.switches[0].contact == 1:

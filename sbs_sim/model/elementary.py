@@ -24,6 +24,12 @@ def exponential_less_one(x: float) -> float:
 
 
 @lru_cache(maxsize=1024)
+def natural_logarithm(x: float) -> float:
+    """Natural logarithm of a number above zero."""
+    return float(DIGITS.ln(Decimal(x)))
+
+
+@lru_cache(maxsize=1024)
 def power(base: float, exponent: float) -> float:
     """Power of a number above zero."""
     return float(DIGITS.power(Decimal(base), Decimal(exponent)))

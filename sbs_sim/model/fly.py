@@ -1,5 +1,6 @@
 """Many ticks in one call of compiled code, so that flights side by side do not wait for Python."""
 
+from sbs_sim.model.air import add_air
 from sbs_sim.model.integrate import FLYING, copy_rows
 from sbs_sim.model.kernel import entry
 
@@ -36,14 +37,15 @@ def fly(
     azimuths : ndarray, shape (rows, n_rotors, n)
         [rad]
     air : ndarray, shape (rows, 3, n)
-        Velocity of the air at the recorded times, NED [m/s].
+        Velocity of the air at the recorded times, NED [m/s]. Of air that is not the same everywhere the rows of
+        `sbs_sim.model.air`, overwritten with what is added where the aircraft is.
     states, forces, loads : ndarray, shapes (rows, size, n), (rows, 3, n), (rows, 8 n_rotors, n)
         Outputs: state, specific force of the c.g. [m/s^2], and see `Work`. Rows after the end of a flight have no
         meaning.
     first_look, watch : int
         Ticks from the start to the first of which working states are recorded, and from one of these to the next.
     looks, look_air : ndarray, shapes (n_looks, n_rotors, n), (n_looks, 3, n)
-        Azimuths [rad] and velocity of the air [m/s] there.
+        Azimuths [rad] and velocity of the air [m/s] there, as `air`.
     working : ndarray, shape (n_looks, n_rotors, WORKING_SIZE, n)
         Output: working states.
     """
@@ -51,12 +53,16 @@ def fly(
     steps_done = tick.done
     for i in range(swash.shape[0]):
         if i == first_look + look * watch:
+            if tick.space.parameters.shape[0] > 0:
+                add_air(model, x, winds[i], (first + i * steps) * h, 0.0, tick.space, look_air[look])
             derivative(model, x, swash[i], looks[look], look_air[look], work, tick.slopes[0], False)
             working_state(model, work, working[look])
             look += 1
         if i == offset + row * every:
             copy_rows(x, states[row])
             if loaded:
+                if tick.space.parameters.shape[0] > 0:
+                    add_air(model, x, winds[i], (first + i * steps) * h, 0.0, tick.space, air[row])
                 derivative(model, x, swash[i], azimuths[row], air[row], work, tick.slopes[0], True)
                 copy_rows(work.acceleration_rows[:3], forces[row])
                 copy_rows(work.load_rows, loads[row])

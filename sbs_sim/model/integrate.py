@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from sbs_sim.lanes import all_lanes, any_lane, as_lanes, as_records, floor, maximum, minimum, sqrt
+from sbs_sim.model.air import add_air
 from sbs_sim.model.contact import give_way
 from sbs_sim.model.exponential import begin_exponential_step, exponential_stage
 from sbs_sim.model.frames import Quaternion
@@ -111,6 +112,8 @@ def make_step(derivative, model, x, swash, psi0, number, h, wind, fraction, shar
             combine(state, slopes, tableau[k], k, h, 0, size, stage)
         set_azimuths(rotors, start, (number + ahead) * h, psi)
         wind_at(air, time + ahead * h, fraction + ahead * share, blowing)
+        if tick.space.parameters.shape[0] > 0:
+            add_air(model, tick.stage, wind, time + ahead * h, fraction + ahead * share, tick.space, tick.wind)
         derivative(model, tick.stage, swash, tick.psi, tick.wind, work, tick.slopes[k], False)
         if method == PARTITIONED and k > 0:
             freeze_forcing(as_records(model.switches)[0], rotors, state, stage, slopes[0], slopes[k])

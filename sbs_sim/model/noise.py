@@ -4,21 +4,17 @@ numpy promises the bits of PCG64, but neither those of its normal distribution n
 that it asks for the tails.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from sbs_sim.lanes import as_lanes, as_records, sqrt
 from sbs_sim.model.frames import ONE
-from sbs_sim.model.kernel import entry, kernel
+from sbs_sim.model.kernel import entry
+from sbs_sim.model.real_functions import logarithm
 from sbs_sim.model.trigonometry import TURN, cosine_sine
 
 Array = NDArray[np.float64]
 
-LOG_2 = 0.6931471805599453
-ROOT_HALF = 0.7071067811865476
-TERMS = 12  # of the series, whose next one is 1e-19
 UNIT = 2.0**-53  # maps integers of 53 bits to numbers between 0 and 1
 
 
@@ -42,16 +38,3 @@ def _box_muller(bits, like, out):
         found[i, 1] = TURN * UNIT * float(bits[i, 1])
         cosine, sine = cosine_sine(found[i, 1])
         found[i, 0], found[i, 1] = radius * cosine, radius * sine
-
-
-@kernel
-def logarithm(x):
-    """Natural logarithm of a number above 0: of what is left of it near 1, 2 artanh((m - 1) / (m + 1))."""
-    m, exponent = math.frexp(x)
-    if m < ROOT_HALF:
-        m, exponent = 2.0 * m, exponent - 1
-    s = (m - 1.0) / (m + 1.0)
-    q, series = s * s, 0.0
-    for k in range(TERMS, -1, -1):
-        series = series * q + 1.0 / (2 * k + 1)
-    return exponent * LOG_2 + 2.0 * s * series

@@ -327,6 +327,7 @@ ACCELERATION = {"specific_force": VECTOR, "angular": VECTOR}  # a_g and om', bod
 LOADS = {"thrust": LANES, "torque": LANES, "force": VECTOR, "moment": VECTOR}  # body axes, about the hub centre
 THRUST, TORQUE, FORCE, MOMENT = 0, 1, 2, 5  # the same as columns
 LOAD_SIZE = 8
+GUST_ROWS = 9  # of the air of each rotor, behind that of the c.g., see `sbs_sim.model.air`
 
 
 def dtype_of(fields: dict[str, Any], n: int) -> np.dtype[Any]:
@@ -367,6 +368,8 @@ class StateIndices(NamedTuple):
         rotor does not have point to the zero behind the state.
     inflow : ndarray of int64, shape (3, quads)
         In the order of `sbs_sim.model.state.INFLOW_NAMES`.
+    gust : ndarray of int64, shape (9, quads)
+        Among the rows of the air, see `sbs_sim.model.air`.
     """
 
     azimuth: IntArray
@@ -376,6 +379,7 @@ class StateIndices(NamedTuple):
     lag: IntArray
     lag_rate: IntArray
     inflow: IntArray
+    gust: IntArray
 
 
 class Model(NamedTuple):
@@ -666,6 +670,31 @@ def _by_registers(coefficients: Sequence[Sequence[Array]], each: int) -> Array:
     return made
 
 
+class Space(NamedTuple):
+    """Air that is not the same everywhere, see `sbs_sim.model.air`; of air that is, all is empty.
+
+    Attributes
+    ----------
+    parameters : ndarray, shape (SPACE_SIZE, n)
+    grids : ndarray, shape (m, SIDE, SIDE, 3)
+        Turbulence, see `sbs_sim.model.air_field`; each flight has some of them, in order.
+    tables : ndarray, shape (m, 4)
+        Own gusts: distance [m], and velocity there, NED [m/s]; each flight has some rows of them.
+    sites : ndarray, shape (rows, n)
+        Memory: where hubs and parts are, and how the hubs' axes lie, NED.
+    """
+
+    parameters: Array
+    grids: Array
+    tables: Array
+    sites: Array
+
+
+def no_space(n: int) -> Space:
+    """Air that is the same everywhere, of n flights."""
+    return Space(aligned((0, n), float), np.zeros((0, 1, 1, 3)), np.zeros((0, 4)), aligned((0, n), float))
+
+
 class Tick(NamedTuple):
     """Memory of a tick.
 
@@ -676,7 +705,8 @@ class Tick(NamedTuple):
     slopes : ndarray, shape (6, size, n)
         Derivatives at its stages.
     psi : ndarray, shape (n_rotors, n)
-    wind : ndarray, shape (3, n)
+    wind : ndarray, shape (3, n), or (air_rows(...), n)
+    space : Space
     lowest_point : ndarray, shape (1, n)
         Down coordinate of the lowest point of the aircraft [m].
     last : ndarray, shape (size, n)
@@ -691,6 +721,7 @@ class Tick(NamedTuple):
     slopes: Array
     psi: Array
     wind: Array
+    space: Space
     lowest_point: Array
     last: Array
     done: IntArray
@@ -706,6 +737,7 @@ def make_tick(work: Work, stages: int, exponential: Exponential) -> Tick:
         slopes=aligned((stages, size, n), float),
         psi=aligned((rotors, n), float),
         wind=aligned((3, n), float),
+        space=no_space(n),
         lowest_point=aligned((1, n), float),
         last=aligned((size, n), float),
         done=np.zeros(n, dtype=np.int64),

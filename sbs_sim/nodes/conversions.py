@@ -23,6 +23,7 @@ from sbs_msgs.msg import (
     DriveCommand,
     DriveState,
     FlightEvent,
+    GustPoint,
     Inflow,
     InflowArray,
     RotorState,
@@ -40,14 +41,16 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.description import Rotor
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight import validity
+from sbs_sim.flight.gust_file import gust_table
 from sbs_sim.flight.records import Event, Snapshot
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.contact import CONTACT_SIZE, DEPTH
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
+from sbs_sim.model.gust_table import GustTable
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.state import harmonic_count
-from sbs_sim.model.wind import MAX_WIND, Wind
+from sbs_sim.model.wind import FIELD, MAX_WIND, RATES, Wind, field_of
 from sbs_sim.recording.recorded_flight import DRIVE_FIELDS
 
 Array = NDArray[np.float64]
@@ -120,8 +123,16 @@ def command_fields(aircraft: Aircraft, rows: Array) -> dict[str, Any]:
     }
 
 
-def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
-    """Wind of a request; what it leaves to the flight comes from the present one.
+# fields of a request that are those of a wind, and such whose 0 is its default
+GIVEN = (
+    *("turbulence_model", "turbulence_lateral_length", "turbulence_vertical_length", "turbulence_extent"),
+    *("gust_shape", "gust_length", "gust_distance", "wind_profile"),
+)
+DEFAULTED = ("reference_height", "roughness_length", "profile_exponent")
+
+
+def wind_of(request: SetWind.Request, snapshot: Snapshot, aircraft: Aircraft) -> Wind:
+    """Wind of a request; what it leaves to the flight and its aircraft comes from the present one.
 
     Raises
     ------
@@ -133,6 +144,9 @@ def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
     speed = float(np.hypot(relative[0], relative[1]))
     heading = quaternion_to_euler(snapshot.state[S.ATTITUDE : S.VELOCITY])[0]
     moving = speed >= MIN_TURBULENCE_AIRSPEED
+    direction = math.atan2(relative[1], relative[0]) if moving else heading
+    north, east, down = snapshot.state[: S.ATTITUDE].tolist()
+    span = aircraft.rotor_span if request.turbulence_extent == RATES else 0.0
     return Wind(
         velocity=velocity,
         gust=_triple(request.gust),
@@ -141,9 +155,35 @@ def wind_of(request: SetWind.Request, snapshot: Snapshot) -> Wind:
         turbulence_intensity=_triple(request.turbulence_intensity),
         turbulence_length=request.turbulence_length or DEFAULT_TURBULENCE_LENGTH,
         turbulence_airspeed=request.turbulence_airspeed or min(max(speed, MIN_TURBULENCE_AIRSPEED), MAX_WIND),
-        turbulence_direction=math.atan2(relative[1], relative[0]) if moving else heading,
+        turbulence_direction=direction,
         turbulence_seed=request.turbulence_seed,
+        turbulence_span=request.turbulence_span or span,
+        gust_direction=direction,
+        gust_origin=(north, east, down),
+        own_gust=gust_table(request.own_gust_csv, "own_gust_csv") if request.own_gust_csv else None,
+        **{name: getattr(request, name) for name in GIVEN},
+        **{name: value for name in DEFAULTED if (value := getattr(request, name)) != 0.0},
     )
+
+
+def prepare_field(request: SetWind.Request) -> None:
+    """Make the field of turbulence of a request, which takes some tenths of a second, while the flight goes on.
+
+    Raises
+    ------
+    SimulationError
+        See `Wind`.
+    """
+    if request.turbulence_extent == FIELD:
+        turbulence = {name: getattr(request, name) for name in GIVEN if name.startswith("turbulence")}
+        field_of(
+            Wind(
+                turbulence_intensity=_triple(request.turbulence_intensity),
+                turbulence_length=request.turbulence_length or DEFAULT_TURBULENCE_LENGTH,
+                turbulence_seed=request.turbulence_seed,
+                **turbulence,
+            )
+        )
 
 
 def event_message(event: Event, step_size: float) -> FlightEvent:
@@ -164,10 +204,20 @@ def event_message(event: Event, step_size: float) -> FlightEvent:
 def _fill_wind(message: WindMessage, wind: Wind) -> None:
     for field in dataclasses.fields(wind):
         value = getattr(wind, field.name)
-        if isinstance(value, tuple):
+        if field.name == "own_gust":
+            _fill_own_gust(message, value)
+        elif isinstance(value, tuple):
             _set_vector(getattr(message, field.name), value)
         else:
             setattr(message, field.name, value)
+
+
+def _fill_own_gust(message: WindMessage, table: GustTable | None) -> None:
+    if table is not None:
+        message.own_gust_over = table.over
+        for position, *velocity in table.rows.tolist():
+            message.own_gust.append(GustPoint(position=position))
+            _set_vector(message.own_gust[-1].velocity, velocity)
 
 
 def _triple(vector: Vector3 | Point) -> tuple[float, float, float]:

@@ -29,7 +29,7 @@ from sbs_sim.model.wind import Wind
 from sbs_sim.nodes.command_monitor import CommandMonitor
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.control_mixer import ControlMixer
-from sbs_sim.nodes.conversions import point_array, swashplate_array, wind_of
+from sbs_sim.nodes.conversions import point_array, prepare_field, swashplate_array, wind_of
 from sbs_sim.nodes.parameters import DEFAULT_GROUND, Parameter, declare, ground_altitude
 from sbs_sim.nodes.process import run
 from sbs_sim.nodes.qos import COMMAND_QOS, SERVICE_QOS
@@ -247,7 +247,8 @@ class Simulator(Component):
 
     def _on_set_wind(self, request: SetWind.Request, response: SetWind.Response) -> SetWind.Response:
         def set_wind() -> None:
-            self.loop.set_wind(lambda now: wind_of(request, now))
+            prepare_field(request)
+            self.loop.set_wind(lambda now: wind_of(request, now, self.aircraft))
 
         return self.answer(response, set_wind, "wind set", request)
 

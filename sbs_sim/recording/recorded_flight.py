@@ -15,6 +15,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.content import ByContent
 from sbs_sim.errors import RecordingError
 from sbs_sim.flight.records import Event
+from sbs_sim.model.gust_table import GustTable
 from sbs_sim.model.state import SPEED
 from sbs_sim.model.wind import Wind
 from sbs_sim.recording.flight_metadata import AIRCRAFT_FILE, AIRFOIL_FOLDER
@@ -29,6 +30,11 @@ OPTIONS = {"tick": float, "azimuth_step": float, "lead_lag": bool, "cyclic_inflo
 GROUND = "ground_altitude"  # an option too; older logs have none
 WIND_VECTORS = ("velocity", "gust", "turbulence_intensity")
 WIND_NUMBERS = ("gust_delay", "gust_duration", "turbulence_length", "turbulence_airspeed", "turbulence_direction")
+NEWER_NUMBERS = (
+    *("turbulence_lateral_length", "turbulence_vertical_length", "turbulence_span", "gust_length", "gust_direction"),
+    *("gust_distance", "reference_height", "roughness_length", "profile_exponent"),
+)
+WIND_WORDS = ("turbulence_model", "turbulence_extent", "gust_shape", "wind_profile")
 DRIVE_FIELDS = {SPEED: "speed"}  # of DriveState, where they are not called as the state is
 EVENT_COUNTS = ("wind_step", "wind_ticks", "drive")  # older logs have none of them
 MAX_STATE_TIME = 10**17  # ns, three years of flight
@@ -175,9 +181,29 @@ def _wind(topic: Topic, i: int) -> Wind:
         name: tuple(float(topic[f"wind.{name}.{axis}"][i]) for axis in "xyz") for name in WIND_VECTORS
     }
     fields |= {name: float(topic[f"wind.{name}"][i]) for name in WIND_NUMBERS}
-    if fields["gust_duration"] == 0.0:  # older logs may name the peak of a gust that there was not
+    if "wind.gust_length" in topic:
+        fields |= _newer_wind(topic, i)
+    elif fields["gust_duration"] == 0.0:  # older logs may name the peak of a gust that there was not
         fields["gust"] = (0.0, 0.0, 0.0)
     return Wind(**fields, turbulence_seed=int(topic["wind.turbulence_seed"][i]))
+
+
+def _newer_wind(topic: Topic, i: int) -> dict[str, Any]:
+    """Fields of a wind that older logs do not have."""
+    fields: dict[str, Any] = {name: float(topic[f"wind.{name}"][i]) for name in NEWER_NUMBERS}
+    fields |= {name: str(topic[f"wind.{name}"][i]) for name in WIND_WORDS if str(topic[f"wind.{name}"][i])}
+    fields["gust_origin"] = tuple(float(topic[f"wind.gust_origin.{axis}"][i]) for axis in "xyz")
+    over = str(topic["wind.own_gust_over"][i])
+    if over:
+        rows: list[list[float]] = []
+        while (name := f"wind.own_gust[{len(rows)}]") + ".position" in topic:
+            row = [float(topic[f"{name}.{part}"][i]) for part in ("position", *(f"velocity.{axis}" for axis in "xyz"))]
+            if math.isnan(row[0]):  # another wind has more rows
+                break
+            rows.append(row)
+        table = np.array(rows).reshape(-1, 4)
+        fields["own_gust"] = GustTable(over, table[:, 0], table[:, 1:])
+    return fields
 
 
 def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, Array]:

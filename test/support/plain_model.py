@@ -541,7 +541,7 @@ def hinge_pitch(blade, swash):
     )
 
 
-def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
+def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=None):
     """Return the aerodynamic force of every element of a blade.
 
     Parameters
@@ -554,6 +554,8 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
         lambda0, lambdas, lambdac [-].
     air_velocity_hub : array, shape (3,)
         Velocity of the hub relative to the undisturbed air [m/s], body axes.
+    air_gradient : array, shape (3, 3), or None
+        Change of the air's velocity per metre from the hub within the disc [1/s], body axes: velocity = it @ position.
 
     Returns
     -------
@@ -574,6 +576,8 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub):
             offset, twist = offset_at(rotor, "quarter", s), along_blade(rotor, "twist", s)
             point = (s + undersling_of(rotor)[0], offset * np.cos(twist), offset * np.sin(twist))
         velocity = blade.velocity(point, air_velocity_hub)
+        if air_gradient is not None:
+            velocity = velocity - air_gradient @ blade.position(point)
         cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
         induced = (
             blade_inflow_speed(rotor)
@@ -1065,7 +1069,7 @@ def solve_accelerations(instant):
     return unknowns - np.linalg.solve(matrix, residual(instant, unknowns))
 
 
-def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
+def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True, local_air=None):
     """Return the `Instant` of a state; arguments as in `plain_derivative`."""
     state = split_state(ac, x, lead_lag, cyclic_inflow)
     attitude = rotation_matrix(state.quaternion)
@@ -1080,10 +1084,14 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
     if stands_on_ground(ac):
         ground = contact(ac, np.asarray(x), attitude)
         part_force, part_moment = part_force + ground[0], part_moment + ground[1]
+    gradients = [None] * len(ac.rotors)
+    if local_air is not None:
+        hub_velocities = [own - gust for own, (gust, _) in zip(hub_velocities, local_air, strict=True)]
+        gradients = [disc_gradient(rotor, slope) for rotor, (_, slope) in zip(ac.rotors, local_air, strict=True)]
     air_loads = []
     for j, rotor in enumerate(ac.rotors):
         met, inflow = met_velocity(rotor, hub_velocities[j]), state.inflow[j] + washes[j].blades
-        air_loads.append([blade_air_loads(ac, blade, swash[j], inflow, met) for blade in blades[j]])
+        air_loads.append([blade_air_loads(ac, blade, swash[j], inflow, met, gradients[j]) for blade in blades[j]])
     return Instant(
         ac=ac,
         lead_lag=lead_lag,
@@ -1102,7 +1110,14 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
     )
 
 
-def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True):
+def disc_gradient(rotor, slope):
+    """Part of a gradient of the air's velocity (body axes) that is within the disc: nothing changes along the shaft."""
+    u = np.asarray(rotor.shaft_direction, dtype=float)
+    within = slope - np.outer(slope @ u, u)
+    return np.stack([met_velocity(rotor, column) for column in within.T], axis=1)
+
+
+def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True, local_air=None):
     """Return the derivative of the state and the rotors' loads.
 
     Parameters
@@ -1118,6 +1133,9 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
         Velocity of the air, NED [m/s].
     lead_lag, cyclic_inflow : bool
         Off: xi and its derivatives, or lambdas and lambdac, are zero as a constraint.
+    local_air : list of (array of shape (3,), array of shape (3, 3)), or None
+        For each rotor the velocity of the air at the hub less that at the c.g. [m/s], and its gradient [1/s], body
+        axes.
 
     Returns
     -------
@@ -1131,7 +1149,7 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True)
         and ``lag_acceleration``, lists of (N_b,) [rad/s^2], of the blades in the rotating frame.
     """
     state = split_state(ac, x, lead_lag, cyclic_inflow)
-    instant = make_instant(ac, x, swash, psi, wind, lead_lag, cyclic_inflow)
+    instant = make_instant(ac, x, swash, psi, wind, lead_lag, cyclic_inflow, local_air)
     attitude = rotation_matrix(state.quaternion)
     om = state.rate
     origin_acceleration, body_rate_dot, flap_dd, lag_dd = unpack(instant, solve_accelerations(instant))

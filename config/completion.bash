@@ -17,10 +17,10 @@ _sbs_sim_options() {
         'linearize') echo '--help --version --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --guess-deg --method --quasi-static --matrices --derivatives --participation --floquet --out --json' ;;
         'sweep') echo '--help --version --values --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --guess-deg --trims-only --workers --dask --out --csv --json' ;;
         'qualities') echo '--help --version --aircraft --set --airspeeds --delay --scale-length --attitude-command --workers --json --out' ;;
-        'batch') echo '--help --version --flights --duration --turbulence --length --seed --spread --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --workers --dask --every --out --csv --json' ;;
+        'batch') echo '--help --version --flights --duration --turbulence --length --spectrum --extent --severity --height --gust-file --seed --spread --aircraft --set --airspeed --climb-rate --sideslip-deg --turn-rate-deg --no-lead-lag --no-cyclic-inflow --azimuth-count --workers --dask --every --out --csv --json' ;;
         'reproduce') echo '--help --version --aircraft --paper-aircraft --json --out' ;;
         'validate') echo '--help --version --list --json --page --strict' ;;
-        'gusts') echo '--help --version --aircraft --set --wind --turbulence --length --gust --gust-duration --seed --duration --delay --limit --json' ;;
+        'gusts') echo '--help --version --aircraft --set --wind --turbulence --length --gust --gust-duration --spectrum --extent --severity --height --gust-file --rule --gradient --seed --duration --delay --limit --json' ;;
         'plot') echo '--help --version --out --flight' ;;
         'airfoil') echo '--help --version --out --extend --aspect-ratio --over --reynolds' ;;
         'aircraft') echo '--help --version --aircraft --set --out' ;;
@@ -35,6 +35,10 @@ _sbs_sim_follows() {
         'trim --method') echo 'newton two_loop' ;;
         'linearize --method') echo 'averaged paper' ;;
         'sweep') echo '@paths' ;;
+        'batch --spectrum' | 'gusts --spectrum') echo 'dryden von_karman' ;;
+        'batch --extent' | 'gusts --extent') echo 'point rates field' ;;
+        'batch --severity' | 'gusts --severity') echo 'light moderate severe' ;;
+        'gusts --rule') echo 'cs25 cs27 cs29' ;;
         'airfoil --extend') echo 'viterna montgomerie plate hold none' ;;
         'airfoil --over') echo 'reynolds mach' ;;
     esac
@@ -42,7 +46,7 @@ _sbs_sim_follows() {
 
 _sbs_sim_parameters() {
     case $1 in
-        'simulator' | 'cockpit') echo 'aircraft:= components:= airspeed:= climb_rate:= sideslip:= turn_rate:= heading:= altitude:= rotor_speed:= on_ground:= ground_altitude:= real_time_factor:= publish_rate:= method:= azimuth_step_deg:= lead_lag:= cyclic_inflow:= command_timeout:= record:= wind:=' ;;
+        'simulator' | 'cockpit') echo 'aircraft:= components:= airspeed:= climb_rate:= sideslip:= turn_rate:= heading:= altitude:= rotor_speed:= on_ground:= ground_altitude:= real_time_factor:= publish_rate:= method:= azimuth_step_deg:= lead_lag:= cyclic_inflow:= command_timeout:= record:= wind:= wind_profile:= reference_height:= roughness_length:= profile_exponent:= turbulence:= turbulence_model:= turbulence_extent:= turbulence_seed:= gust_file:=' ;;
         'control_mixer' | 'analysis') echo 'aircraft:=' ;;
         'hover_hold') echo 'largest_distance:= patience:= position_limit:=' ;;
         'teleop') echo 'aircraft:= augmentation:= expo:= collective_deg:= cyclic_deg:= differential_deg:=' ;;

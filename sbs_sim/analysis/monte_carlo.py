@@ -38,6 +38,7 @@ def gust_cases(
     length: float = 50.0,
     seed: int = 0,
     spread: Mapping[str, float] | None = None,
+    air: Mapping[str, Any] | None = None,
 ) -> list[Case]:
     """Flights with the controls of their trims, each through Dryden turbulence of its own.
 
@@ -56,6 +57,8 @@ def gust_cases(
     spread : mapping of str to float, optional
         Paths for `Aircraft.with_values`, and standard deviations relative to the value there: that of a flight is
         normally distributed around it.
+    air : mapping of str to object, optional
+        Further fields of the `Wind` of every flight, or others in place of those: {"turbulence_extent": "field"}.
 
     Returns
     -------
@@ -76,19 +79,25 @@ def gust_cases(
     spread = {} if spread is None else spread
     checks.instance("spread", spread, Mapping, BatchError)
     centres = {path: (_centre(aircraft, path), _checked_share(path, share)) for path, share in spread.items()}
+    checks.instance("air", {} if air is None else air, Mapping, BatchError)
+    others = dict(air or {})
+    unknown = [name for name in others if name not in Wind.__dataclass_fields__]
+    if unknown:
+        raise BatchError(f"air: {checks.shown(unknown[0])}: allowed are {', '.join(Wind.__dataclass_fields__)}")
     given = asdict(condition) if isinstance(condition, TrimCondition) else dict(condition)
     most, unit = LIMITS["airspeed"]
     airspeed = checks.number("airspeed", given.get("airspeed", 0.0), -most, most, unit, BatchError)
     cases = []
     for i in range(flights):
         source = np.random.PCG64(np.random.SeedSequence([seed, i]))
-        wind = Wind(
-            turbulence_intensity=(turbulence, turbulence, turbulence),
-            turbulence_length=length,
-            turbulence_airspeed=max(abs(airspeed), MIN_AIRSPEED),
-            turbulence_direction=given.get("sideslip", 0.0),
-            turbulence_seed=source.random_raw() >> 1,
-        )
+        fields = {
+            "turbulence_intensity": (turbulence, turbulence, turbulence),
+            "turbulence_length": length,
+            "turbulence_airspeed": max(abs(airspeed), MIN_AIRSPEED),
+            "turbulence_direction": given.get("sideslip", 0.0),
+            "turbulence_seed": source.random_raw() >> 1,
+        }
+        wind = Wind(**fields | others)
         numbers = normal(source, -(-len(centres) // 2)).ravel().tolist()
         scattered = zip(centres.items(), numbers, strict=False)
         changes = {path: mean * (1.0 + share * number) for (path, (mean, share)), number in scattered}

@@ -4,6 +4,7 @@ import argparse
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from sbs_sim.commands.air_arguments import add_air_arguments, air_fields
 from sbs_sim.commands.common import (
     OUTSIDE,
     add_flight_arguments,
@@ -51,6 +52,7 @@ def make_parser() -> Parser:
         help="standard deviation of the turbulence [m/s] (default: 1.5)",
     )
     group.add_argument("--length", type=float, default=50.0, metavar="X", help="Dryden scale length [m] (default: 50)")
+    add_air_arguments(group)
     group.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)")
     group.add_argument(
         "--spread",
@@ -83,14 +85,16 @@ def _work(arguments: argparse.Namespace) -> None:
     if not 0.01 <= arguments.every <= 1e6:
         raise BatchError(f"--every {arguments.every:g}: allowed are 0.01 to 1e+06 s")
     condition, fidelity = flight(arguments)
+    craft = aircraft(arguments)
     cases = gust_cases(
-        aircraft(arguments),
+        craft,
         arguments.flights,
         condition,
         turbulence=arguments.turbulence,
         length=arguments.length,
         seed=arguments.seed,
         spread=dict(arguments.spread),
+        air=air_fields(arguments, craft),
     )
     with progress_bar(" flights", len(cases)) as progress:
         batch = simulate_cases(

@@ -4,6 +4,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
+from sbs_sim.commands.air_arguments import add_air_arguments, air_fields
 from sbs_sim.commands.common import (
     DEGREES,
     OUTSIDE,
@@ -52,6 +53,13 @@ def make_parser() -> Parser:
         ("--gust-duration", 2.0, "their length [s]"),
     ):
         group.add_argument(name, type=float, default=default, metavar="X", help=f"{meaning} (default: {default:g})")
+    add_air_arguments(group)
+    group.add_argument(
+        "--rule",
+        choices=("cs25", "cs27", "cs29"),
+        help="gusts of this rule in place of --gust, which drift over the aircraft with the steady wind",
+    )
+    group.add_argument("--gradient", type=float, metavar="X", help="gradient distance of --rule [m]")
     group.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the turbulence (default: 0)")
     group = parser.add_argument_group("flight")
     group.add_argument(
@@ -92,8 +100,8 @@ def _work(arguments: argparse.Namespace) -> None:
     if not 1.0 <= arguments.duration <= MAX_DURATION:
         raise UsageError(f"--duration {arguments.duration:g}: allowed are 1 to {MAX_DURATION:g} s")
     check_target(arguments.json)
-    airs = _airs(arguments)
     craft = aircraft(arguments)
+    airs = _airs(arguments, craft)
     model = linearize(craft)
     found = design(HoverModel.of(model), dict(arguments.limit))
     print(f"hover hold of {craft.name}")
@@ -111,22 +119,47 @@ def _work(arguments: argparse.Namespace) -> None:
         write(arguments.json, to_json(results_with_warnings))
 
 
-def _airs(arguments: argparse.Namespace) -> dict[str, tuple["Wind", float, float]]:
+def _airs(arguments: argparse.Namespace, craft: "Aircraft") -> dict[str, tuple["Wind", float, float]]:
     """What is flown in, for how long before figures are taken, and for how long with them [s]."""
     from sbs_sim.model.wind import Wind
 
-    turbulence = Wind(
-        velocity=(-arguments.wind, 0.0, 0.0),
-        turbulence_intensity=(arguments.turbulence,) * 3,
-        turbulence_length=arguments.length,
-        turbulence_airspeed=max(abs(arguments.wind), MIN_TURBULENCE_AIRSPEED),
-        turbulence_seed=arguments.seed,
+    fields = {
+        "velocity": (-arguments.wind, 0.0, 0.0),
+        "turbulence_intensity": (arguments.turbulence,) * 3,
+        "turbulence_length": arguments.length,
+        "turbulence_airspeed": max(abs(arguments.wind), MIN_TURBULENCE_AIRSPEED),
+        "turbulence_seed": arguments.seed,
+    }
+    name = (
+        f"turbulence {arguments.turbulence:g} m/s" if arguments.severity is None else f"{arguments.severity} turbulence"
     )
-    airs = {f"turbulence {arguments.turbulence:g} m/s": (turbulence, SETTLING, arguments.duration)}
+    airs = {name: (Wind(**fields | air_fields(arguments, craft)), SETTLING, arguments.duration)}
+    if (arguments.rule is None) != (arguments.gradient is None):
+        raise UsageError("--rule, --gradient: allowed are both or neither")
+    if arguments.rule is not None:
+        return airs | _rule_gusts(arguments)
     size = arguments.gust
     for name, peak in (("ahead", (-size, 0.0, 0.0)), ("left", (0.0, size, 0.0)), ("above", (0.0, 0.0, size))):
         gust = Wind(gust=peak, gust_delay=GUST_DELAY, gust_duration=arguments.gust_duration)
         airs[f"gust {size:g} m/s, {name}"] = (gust, 0.0, GUST_DELAY + arguments.gust_duration + AFTER_GUST)
+    return airs
+
+
+def _rule_gusts(arguments: argparse.Namespace) -> dict[str, tuple["Wind", float, float]]:
+    """Gusts of a rule that arrive after the integrals have settled."""
+    from sbs_sim.flight.gust_standards import certification_gust
+    from sbs_sim.model.wind import Wind
+
+    if not arguments.wind >= MIN_TURBULENCE_AIRSPEED:
+        allowed = f"at least {MIN_TURBULENCE_AIRSPEED:g} m/s, which takes the gusts of --rule over the aircraft"
+        raise UsageError(f"--wind {arguments.wind:g}: allowed is {allowed}")
+    airs = {}
+    for name, to in (("ahead", "back"), ("left", "right"), ("above", "down"))[2 if arguments.rule == "cs27" else 0 :]:
+        gust = certification_gust(arguments.rule, to=to, gradient=arguments.gradient)
+        distance = arguments.wind * (SETTLING + GUST_DELAY)
+        air = Wind(velocity=(-arguments.wind, 0.0, 0.0), gust_distance=distance, **gust)
+        passing = gust["gust_length"] / arguments.wind
+        airs[f"{arguments.rule}, {name}"] = (air, SETTLING, GUST_DELAY + passing + AFTER_GUST)
     return airs
 
 

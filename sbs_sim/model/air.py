@@ -2,7 +2,7 @@
 
 Turbulence as a field in space, wind that grows with height, fronts of gusts that the aircraft flies through, and the
 rotation of the air that military specifications make of turbulence. `add_air` samples all of it where the aircraft is
-at a stage of a step (theory.md section 7.4). It works flight by flight with plain numbers, so that its bits do not
+at a stage of a step (theory.md section 7.8). It works flight by flight with plain numbers, so that its bits do not
 depend on the number of lanes.
 """
 

@@ -1,4 +1,4 @@
-"""A frozen field of turbulence over the horizontal plane, made from a seed (theory.md section 7.4).
+"""A frozen field of turbulence over the horizontal plane, made from a seed (theory.md section 7.8).
 
 The field is a sum of waves on a few levels. A level is a square of `SIDE` x `SIDE` points that repeats itself, of a
 sixteenth of the side of the level before it. Each has the waves of its own band of wave numbers with the energy that
@@ -122,7 +122,7 @@ def _spectrum(noise, component, karman, length, vertical_length, period, lowest,
 
 @kernel
 def plane_spectra(karman, length, wave_number):
-    """Two-dimensional spectra A, B, C [m^2] of turbulence of variance 1 at a wave number [rad/m], eq. (7.16).
+    """Two-dimensional spectra A, B, C [m^2] of turbulence of variance 1 at a wave number [rad/m], eq. (7.23).
 
     Of the components along the wave, across it in the plane, and across the plane; over the complete plane each pair
     (A + B) / 2 and C have the integral 1.

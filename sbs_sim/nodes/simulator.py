@@ -21,15 +21,17 @@ from sbs_sim.analysis.trim import trim
 from sbs_sim.analysis.trim_problem import MIN_SPEED
 from sbs_sim.errors import SbsError, SimulationError, TrimError
 from sbs_sim.flight.contact import state_on_ground
+from sbs_sim.flight.gust_file import read_gust
+from sbs_sim.flight.gust_standards import specified_turbulence
 from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP_DEG, FREE_METHOD, METHOD, METHODS, Simulation
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import MAX_SPEED, standing_state, trimmed_state
 from sbs_sim.flight_loop import FlightLoop
-from sbs_sim.model.wind import Wind
+from sbs_sim.model.wind import MAX_WIND, RATES, Wind
 from sbs_sim.nodes.command_monitor import CommandMonitor
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.control_mixer import ControlMixer
-from sbs_sim.nodes.conversions import point_array, prepare_field, swashplate_array, wind_of
+from sbs_sim.nodes.conversions import MIN_TURBULENCE_AIRSPEED, point_array, prepare_field, swashplate_array, wind_of
 from sbs_sim.nodes.parameters import DEFAULT_GROUND, Parameter, declare, ground_altitude
 from sbs_sim.nodes.process import run
 from sbs_sim.nodes.qos import COMMAND_QOS, SERVICE_QOS
@@ -41,6 +43,10 @@ from sbs_sim.output.units import counted
 OFF = "off"
 # How long a thread keeps the interpreter while the flight waits for it [s]; the 5 ms of Python are half a tick.
 SWITCH_INTERVAL = 0.5e-3
+WIND_PARAMETERS = (
+    *("wind_profile", "reference_height", "roughness_length", "profile_exponent"),
+    *("turbulence_model", "turbulence_extent", "turbulence_seed"),
+)
 CONDITION = ("airspeed", "climb_rate", "sideslip", "turn_rate")
 COMPONENTS = ("simulator", "control_mixer", "analysis", "recorder")
 PARAMETERS = {
@@ -98,6 +104,17 @@ PARAMETERS = {
         "", "Log of the flight: a file, an existing folder, empty for bags/<date>_<time>_<aircraft>.mcap, or off"
     ),
     "wind": Parameter([0.0, 0.0, 0.0], "Steady wind: velocity of the air, north, east, down [m/s]"),
+    "wind_profile": Parameter("uniform", "Steady wind over the height: uniform, logarithmic or power"),
+    "reference_height": Parameter(6.096, "Height above the ground at which the steady wind is that [m]", 0.1, 1e4),
+    "roughness_length": Parameter(0.04572, "Roughness length of the logarithmic profile [m]", 1e-6, 10.0),
+    "profile_exponent": Parameter(0.143, "Exponent of the power profile", 0.0, 1.0),
+    "turbulence": Parameter(
+        "off", "Turbulence at the start: off, or light, moderate, severe of MIL-F-8785C at the height of the start"
+    ),
+    "turbulence_model": Parameter("dryden", "Spectra of the turbulence: dryden or von_karman"),
+    "turbulence_extent": Parameter("point", "Where turbulence acts: point, rates or field, see SetWind"),
+    "turbulence_seed": Parameter(0, "Seed of the turbulence, not negative"),
+    "gust_file": Parameter("", "Own gust at the start: CSV file, see SetWind; empty for none"),
 }
 
 
@@ -142,10 +159,11 @@ class Simulator(Component):
         """Simulation in trimmed flight at the condition that the parameters name, or of rotors on a stand."""
         if len(values["wind"]) != 3:
             raise SbsError(f"parameter wind = {list(values['wind'])}: allowed are 3 numbers, north, east, down [m/s]")
-        wind = Wind(velocity=tuple(values["wind"]))
-        condition = [values[name] for name in CONDITION]
-        position, start = (0.0, 0.0, -values["altitude"]), (values["heading"], wind.velocity, values["rotor_speed"])
         self._ground = ground_altitude(self.aircraft, values["ground_altitude"])
+        height = values["altitude"] - self._ground
+        wind = initial_wind(values, height, self.aircraft)
+        condition, position = [values[name] for name in CONDITION], (0.0, 0.0, -values["altitude"])
+        start = values["heading"], wind.velocity_at(height), values["rotor_speed"]
         state, controls = self._beginning(condition, position, *start, values["on_ground"])
         simulation = Simulation(
             self.aircraft,
@@ -237,7 +255,8 @@ class Simulator(Component):
             if request.from_state:
                 self.loop.reset(request.state, self.loop.swashplate())
                 return
-            wind, position = self.loop.wind().velocity, point_array(request.position)
+            position = point_array(request.position)
+            wind = self.loop.wind().velocity_at(-float(position[2]) - self._ground)
             condition = [getattr(request, name) for name in CONDITION]
             start = request.heading, wind, request.rotor_speed, request.on_ground
             state, controls = self._beginning(condition, position, *start)
@@ -302,6 +321,30 @@ def check_reset(request: Reset.Request) -> None:
     for name, value in (unused | {"rotor_speed": request.rotor_speed}).items():
         if value != usual.get(name, 0.0):
             raise SimulationError(f"{name} = {value:g}: not allowed with from_state = true, the state has its own")
+
+
+def initial_wind(values: dict[str, Any], height: float, aircraft: Aircraft) -> Wind:
+    """Wind of the parameters, at a height of the start above the ground [m].
+
+    Raises
+    ------
+    SbsError
+        A value is out of range, or the file of a gust cannot be read.
+    """
+    extent, airspeed = values["turbulence_extent"], abs(values["airspeed"])
+    fields = {name: values[name] for name in WIND_PARAMETERS}
+    if values["turbulence"] != OFF:
+        fields |= specified_turbulence(height, values["turbulence"], model=values["turbulence_model"])
+        passing = airspeed or math.hypot(*values["wind"][:2])
+        fields["turbulence_airspeed"] = min(max(passing, MIN_TURBULENCE_AIRSPEED), MAX_WIND)
+        fields["turbulence_direction"] = values["heading"]
+    return Wind(
+        velocity=tuple(values["wind"]),
+        turbulence_span=aircraft.rotor_span if extent == RATES else 0.0,
+        gust_direction=values["heading"],
+        own_gust=read_gust(values["gust_file"]) if values["gust_file"] else None,
+        **fields,
+    )
 
 
 def checked_components(names: list[str]) -> tuple[str, ...]:

@@ -72,7 +72,7 @@ def test_named_files_exist(path):
 
 def test_numerical_modules_are_all_there():
     """Every file of the model is named by the page, but for what holds no equation."""
-    helpers = {"__init__", "kernel", "kernel_cache", "records", "state"}
+    helpers = {"__init__", "kernel", "kernel_cache", "records", "state", "wind_columns"}
     missing = [path.stem for path in (ROOT / "sbs_sim/model").glob("*.py") if path.name not in TEXT]
     assert set(missing) <= helpers
 

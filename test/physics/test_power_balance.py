@@ -32,13 +32,19 @@ def missing(found):
     return float(np.abs(rows @ SIGNS).max())
 
 
-OWN = {"ducts": {"duct"}, "tails": {"surfaces", "actuators"}, "drives": {"kinetic_drives"}}
+OWN = {
+    "ducts": {"duct"},
+    "tails": {"surfaces", "actuators"},
+    "drives": {"kinetic_drives"},
+    "wakes": {"duct", "interference"},
+}
 AIRCRAFT = {
     "sbs": lambda: Aircraft.load("sbs"),
     "ducts": lambda: build(every_rotor={"duct": DUCT}),
     "shares": lambda: build(every_rotor={"duct_expansion": 0.8, "induced_power_factor": 1.15}),
     "drives": lambda: Aircraft.load(DATA / "electric.yaml"),
     "tails": lambda: Aircraft.load("uh60a_genhel"),
+    "wakes": lambda: build(every_rotor={"duct": DUCT}, options={"interference": "skewed_wake"}),
 }
 
 
@@ -64,9 +70,7 @@ def test_the_balance_closes_at_every_tick_of_a_manoeuvre(name):
     taken = {term for term in POWER_TERMS if np.abs(flight[f"power_{term}"]).max() > 1e-6 * hover_power(name)}
     assert {"engine", "induced", "profile", "fuselage", "gravity", "kinetic_body", "kinetic_blades"} <= taken
     assert {"apparent_mass", "wind"} <= taken
-    assert {"ducts": {"duct"}, "tails": {"surfaces", "actuators"}, "drives": {"kinetic_drives"}}.get(
-        name, set()
-    ) <= taken
+    assert OWN.get(name, set()) <= taken
 
 
 @pytest.mark.parametrize("fidelity", [{"lead_lag": False}, {"cyclic_inflow": False}])

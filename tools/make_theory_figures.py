@@ -17,6 +17,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Polygon, Rectangle
 
+from sbs_sim import Aircraft, simulate
+from sbs_sim import trim as fly_trim
+
 OUTPUT = Path(__file__).resolve().parent.parent / "docs" / "images"
 STYLE = {
     "svg.hashsalt": "sbs_sim",
@@ -663,6 +666,23 @@ def _loops_flow(axes: Axes) -> None:
     note(axes, (9.2, 2.75), "no", FAINT, 8)
 
 
+def power() -> Figure:
+    """Where the power goes after a step of collective (docs/howto/power.md)."""
+    aircraft = Aircraft.load("sbs")
+    cruise = fly_trim(aircraft, airspeed=10.0)
+    steps = [cruise.controls + [0.02 * (i >= 20), 0.0, 0.0, 0.0] for i in range(101)]
+    flight = simulate(aircraft, cruise, steps, duration=1.0, outputs=["power_balance"])
+    figure = Figure(figsize=(7.2, 3.4))
+    axes = figure.add_axes((0.1, 0.15, 0.66, 0.8))
+    shown = ("engine", "induced", "profile", "gravity", "kinetic_body", "kinetic_blades", "apparent_mass")
+    for name, color in zip(shown, (INK, BLUE, GREEN, RED, FAINT, "#8e5ea2", "#d18a1c"), strict=True):
+        axes.plot(flight["time"], flight[f"power_{name}"], color=color, label=name, linewidth=1.3)
+    axes.set(xlabel="time [s]", ylabel="power [W]", xlim=(0.0, 1.0))
+    axes.grid(color="#dddddd", linewidth=0.6)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
+    return figure
+
+
 FIGURES = {
     "frames": frames,
     "azimuth": azimuth,
@@ -672,6 +692,7 @@ FIGURES = {
     "inflow": inflow,
     "mass_matrix": mass_matrix,
     "trim": trim_flow,
+    "power": power,
 }
 
 

@@ -24,11 +24,13 @@ from sbs_sim.concurrency.parallel import Execution, compute
 from sbs_sim.content import ByContent
 from sbs_sim.errors import BatchError, SbsError
 from sbs_sim.flight.controls import Commands
+from sbs_sim.flight.power_balance import POWER_BALANCE
 from sbs_sim.flight.sortie import Sortie, fly_together, structure
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_angles
 from sbs_sim.model.packing import lane_count
+from sbs_sim.model.power import POWER_TERMS
 from sbs_sim.model.wind import Wind
 
 if TYPE_CHECKING:
@@ -40,6 +42,7 @@ Result = tuple[dict[str, Array], str | None, tuple[str, ...]]  # histories, erro
 
 LOADED = ("acceleration", "thrust", "torque", "power")  # which take a derivative at every row
 GROUPS = ("state", "controls", "swashplate", *LOADED)
+ALL_GROUPS = (*GROUPS, POWER_BALANCE)
 OPTIONS = ("tick", "azimuth_step", "method", "ground_altitude", "actuators")
 TRIM_ARGUMENTS = tuple(list(inspect.signature(trim).parameters)[1:])  # but the aircraft
 CANCELLED = "cancelled"
@@ -180,7 +183,8 @@ def simulate_batch(
         What to keep of "state" (n_flights, n_rows, n_states), "controls" (..., n_controls), "swashplate"
         (..., n_rotors, 3), "acceleration" (..., 3), "thrust", "torque", "power" (..., n_rotors), and of single states
         by their names (n_flights, n_rows). The four loads and accelerations take a derivative for every row. Aircraft
-        with fewer rotors or other states have NaN there.
+        with fewer rotors or other states have NaN there. Not by default there is "power_balance" (..., n_terms), where
+        the power goes in the order of `sbs_sim.model.power.POWER_TERMS`, for one more derivative.
     lead_lag, cyclic_inflow, azimuth_count :
         Fidelity of the flights, and of the trims from which they start; see `sbs_sim.trim`.
     workers : int, optional
@@ -282,11 +286,11 @@ def _plan(
     unknown = [name for name in options if name not in OPTIONS]
     if unknown:
         raise BatchError(f"{unknown[0]}: unknown option, allowed are {', '.join((*OPTIONS, *asdict(fidelity)))}")
-    known = {*GROUPS, *(name for case in cases for name in case.aircraft.layout.names)}
+    known = {*ALL_GROUPS, *(name for case in cases for name in case.aircraft.layout.names)}
     checks.instance("outputs", outputs, Sequence, BatchError)
     for name in outputs:
         if not (isinstance(name, str) and name in known):
-            raise BatchError(f"outputs: {checks.shown(name)}: allowed are {', '.join(GROUPS)} and names of states")
+            raise BatchError(f"outputs: {checks.shown(name)}: allowed are {', '.join(ALL_GROUPS)} and names of states")
     return Plan(duration, fidelity, every, tuple(dict.fromkeys(outputs)), options)
 
 
@@ -312,6 +316,7 @@ def _memory(
         "swashplate": (max(len(case.aircraft.rows) for case in cases), 3),
         "acceleration": (3,),
         **dict.fromkeys(("thrust", "torque", "power"), (rotors,)),
+        POWER_BALANCE: (len(POWER_TERMS),),
     }
     shapes = {name: (len(cases), rows, *sizes.get(name, ())) for name in outputs}
     need = 8.0 * sum(math.prod(shape) for shape in shapes.values())
@@ -412,7 +417,8 @@ def _sortie(
         if not isinstance(start, TrimPoint):
             raise BatchError("controls: needed where the start is a state")
         controls = start.controls
-    loaded = any(name in LOADED for name in plan.outputs)
+    balanced = POWER_BALANCE in plan.outputs
+    loaded = balanced or any(name in LOADED for name in plan.outputs)
     return Sortie(
         aircraft,
         start,
@@ -420,6 +426,7 @@ def _sortie(
         plan.duration,
         every=plan.every,
         loaded=loaded,
+        balanced=balanced,
         wind=wind,
         lead_lag=fidelity.lead_lag,
         cyclic_inflow=fidelity.cyclic_inflow,

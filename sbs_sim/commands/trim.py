@@ -18,6 +18,10 @@ from sbs_sim.commands.common import (
 )
 from sbs_sim.terminal.command_line import Parser
 
+MAIN_SHARES = ("induced", "interference", "profile", "fuselage", "surfaces", "duct", "gravity")  # of the power
+ALWAYS = ("induced", "profile", "fuselage")
+LEAST_SHARE = 1e-3  # of the power, of those that are shown
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -83,7 +87,27 @@ def print_trim(craft: "Aircraft", point: "TrimPoint", effects: "Sequence[Control
     print_table(["rotors", *(rotor.name for rotor in craft.rotors)], _rotor_rows(craft, point))
     print()
     print(f"power of all rotors {point.power.sum():.2f} W")
+    if shares := _shares(craft, point):
+        print(f"goes into [W] {shares}")
     print_limits(point)
+
+
+def _shares(craft: "Aircraft", point: "TrimPoint") -> str:
+    """Where the power goes, in words; nothing for aircraft without a balance of power."""
+    from sbs_sim.analysis.power import power_shares
+    from sbs_sim.errors import SimulationError
+    from sbs_sim.model.power import SUPPLY
+
+    try:
+        powers = power_shares(craft, point)
+    except SimulationError:
+        return ""
+    taken = {name: power for name, power in powers.items() if name not in SUPPLY}
+    main = {"climb" if name == "gravity" else name: taken.pop(name) for name in MAIN_SHARES}
+    least = LEAST_SHARE * max(map(abs, powers.values()))
+    shown = {name: power for name, power in main.items() if name in ALWAYS or abs(power) > least}
+    rest = sum(taken.values()) + sum(power for name, power in main.items() if name not in shown)
+    return ", ".join(f"{name} {power:.1f}" for name, power in (*shown.items(), ("other", rest)))
 
 
 def _deflection_rows(point: "TrimPoint") -> list[list[str]]:

@@ -104,6 +104,7 @@ def test_changes_are_checked_together():
         {"rotors.radius": 0.4, "rotors.blade_cg": 0.18, "body.inertia[0][1]": 0.02}
     )
     assert row(text, "power of all rotors") == [round(trim(craft).power.sum(), 2)]
+    assert re.search(r"^goes into \[W\] induced [\d.]+, profile [\d.]+, fuselage 0.0, other -?0.0$", text, re.MULTILINE)
 
 
 def test_trim_names_what_is_beyond_its_limits():

@@ -11,7 +11,8 @@ from balances import balance, totals
 from helpers import aircraft_data, build, unit
 from random_options import equipped_flights
 
-from sbs_sim import Aircraft, simulate, trim
+from sbs_sim import Aircraft, Case, simulate, simulate_batch, trim
+from sbs_sim.analysis.power import power_shares
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.power_balance import power_balance
 from sbs_sim.flight.trimmed_state import trimmed_state
@@ -201,3 +202,25 @@ def test_other_outputs_are_refused(outputs):
     aircraft = AIRCRAFT["sbs"]()
     with pytest.raises(SimulationError, match=r"^outputs = .*: allowed are"):
         simulate(aircraft, trim(aircraft), trim(aircraft).controls, 0.01, outputs=outputs)
+
+
+def test_the_power_of_a_trim_is_that_of_its_flight():
+    """Over whole revolutions; what a trim leaves out is the vibration of the body."""
+    aircraft = AIRCRAFT["ducts"]()
+    point = trim(aircraft, 10.0, climb_rate=2.0)
+    shares = power_shares(aircraft, point)
+    flight = simulate(aircraft, point, point.controls, 0.025 * 4, tick=0.025 / 12, outputs=["power_balance"])
+    flown = dict(zip(POWER_TERMS, flight["power_balance"][:-1].mean(axis=0), strict=True))
+    assert shares["engine"] == pytest.approx(point.power.sum(), rel=1e-9)
+    for name in ("induced", "profile", "fuselage", "duct", "gravity"):
+        assert shares[name] == pytest.approx(flown[name], abs=2e-3 * shares["engine"])
+    assert shares["gravity"] == pytest.approx(2.0 * aircraft.body.mass * aircraft.environment.gravity, rel=1e-3)
+
+
+def test_a_batch_has_the_balance_of_each_flight():
+    aircraft = AIRCRAFT["sbs"]()
+    point = trim(aircraft)
+    found = simulate_batch([Case(aircraft, point)] * 2, 0.03, outputs=["power_balance"])
+    alone = simulate(aircraft, point, point.controls, 0.03, outputs=["power_balance"])
+    for flown in found["power_balance"]:
+        np.testing.assert_array_equal(flown, alone["power_balance"])

@@ -29,7 +29,7 @@ def main() -> None:
 
 
 def option_rows() -> list[Row]:
-    """Rows of a helicopter with airfoils over the Mach number, surfaces, fuselage and dampers, interference and drives."""
+    """Rows of a helicopter with airfoils over the Mach number, surfaces, fuselage, dampers, wash and drives."""
     sbs = Aircraft.load("sbs")
     many = Aircraft.load("uh60a_genhel").with_value("options.elements", sbs.options.elements)
     rows = _rows("UH-60A, 10 elements of a blade", Aircraft.load("uh60a_genhel"), sbs)

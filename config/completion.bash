@@ -29,7 +29,7 @@ _sbs_sim_options() {
 
 _sbs_sim_follows() {
     case $1 in
-        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'qualities --json' | 'qualities --out' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'validate --json' | 'validate --page' | 'gusts --json' | 'plot' | 'plot --out' | 'airfoil' | 'airfoil --out' | 'aircraft --out') echo '@files' ;;
+        'replay' | 'replay --out' | 'cockpit --logs' | 'trim --json' | 'linearize --out' | 'linearize --json' | 'sweep --out' | 'sweep --csv' | 'sweep --json' | 'qualities --json' | 'qualities --out' | 'batch --gust-file' | 'batch --out' | 'batch --csv' | 'batch --json' | 'reproduce --json' | 'reproduce --out' | 'validate --json' | 'validate --page' | 'gusts --gust-file' | 'gusts --json' | 'plot' | 'plot --out' | 'airfoil' | 'airfoil --out' | 'aircraft --out') echo '@files' ;;
         'replay --set' | 'trim --set' | 'linearize --set' | 'sweep --set' | 'qualities --set' | 'batch --spread' | 'batch --set' | 'gusts --set' | 'aircraft --set') echo '@assigned' ;;
         'trim --aircraft' | 'linearize --aircraft' | 'sweep --aircraft' | 'qualities --aircraft' | 'batch --aircraft' | 'reproduce --aircraft' | 'reproduce --paper-aircraft' | 'gusts --aircraft' | 'aircraft --aircraft') echo '@aircraft' ;;
         'trim --method') echo 'newton two_loop' ;;

@@ -372,8 +372,9 @@ def _offset_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
     if aircraft.options.coupling != "complete":
         return [f"options.coupling = {aircraft.options.coupling!r}: allowed with offsets of the blade is complete"]
     problems = []
-    if rotor.tip_loss_model != "factor" or rotor.profile_drag != "section":
-        problems.append("tip_loss_model, profile_drag: allowed with offsets of the blade are factor and section")
+    if any(one.tip_loss_model != "factor" or one.profile_drag != "section" for one in aircraft.rotors):
+        allowed = "allowed where a rotor of the aircraft has offsets of its blades are factor and section"
+        problems.append(f"tip_loss_model, profile_drag: {allowed}")
     if rotor.undersling and not rotor.is_teetering:
         problems.append(f"undersling = {rotor.undersling:g}: allowed is 0 where flap_hinge is not teetering")
     stations = np.unique(np.concatenate([[0.0, 1.0], *([] if rotor.quarter_stations is None else [_inner(rotor)])]))

@@ -208,6 +208,15 @@ def test_blades_that_would_twist_or_flutter_are_said():
     assert any("without torsion" in line for line in trim(Aircraft.from_dict(aircraft_data(every_rotor=far))).warnings)
 
 
+@pytest.mark.parametrize("option", [{"tip_loss_model": "prandtl"}, {"profile_drag": "oblique"}])
+def test_no_rotor_beside_offsets_has_options_of_sections(option):
+    """All blades of the aircraft meet the air as those with offsets do, which know neither."""
+    offsets = {"quarter_chord": {"root": 0.0, "tip": 0.01}}
+    for rotors in ([offsets | option, {}], [offsets, option]):
+        with pytest.raises(AircraftError, match="where a rotor of the aircraft has offsets of its blades are factor"):
+            Aircraft.from_dict(aircraft_data(rotors=rotors))
+
+
 def test_paper_coupling_has_no_offsets():
     with pytest.raises(
         AircraftError, match=r"options\.coupling = 'paper': allowed with offsets of the blade is complete"

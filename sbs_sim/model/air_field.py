@@ -122,7 +122,7 @@ def _spectrum(noise, component, karman, length, vertical_length, period, lowest,
 
 @kernel
 def plane_spectra(karman, length, wave_number):
-    """Two-dimensional spectra A, B, C [m^2] of turbulence of variance 1 at a wave number [rad/m], eq. (7.23).
+    """Two-dimensional spectra A, B, C [m^2] of turbulence of variance 1 at a wave number [rad/m], eq. (7.24).
 
     Of the components along the wave, across it in the plane, and across the plane; over the complete plane each pair
     (A + B) / 2 and C have the integral 1.

@@ -209,7 +209,7 @@ LENGTH, SPAN = 20.0, 1.3
 def lateral_spectra(omega, d, length):
     """Two-sided cross-spectra over the wave number along of u, v, w at points d apart across, of variance 1.
 
-    From the correlation exp(-r / L) of Dryden's turbulence: the two-dimensional spectra of eq. (7.23), integrated
+    From the correlation exp(-r / L) of Dryden's turbulence: the two-dimensional spectra of eq. (7.24), integrated
     over the wave number across with cos(k d) (Gradshteyn and Ryzhik 3.773.6: modified Bessel functions).
     """
     q, b = np.sqrt(1 + (length * omega) ** 2), d / length

@@ -50,10 +50,8 @@ def main() -> None:
 
 def changed(aircraft: Aircraft, values: str) -> Aircraft:
     """Aircraft with the values of `PATH=VALUE,PATH=VALUE`, as `--set` takes them."""
-    for setting in filter(None, values.split(",")):
-        path, _, value = setting.partition("=")
-        aircraft = aircraft.with_value(path, YAML(typ="safe", pure=True).load(value))
-    return aircraft
+    pairs = [setting.partition("=") for setting in filter(None, values.split(","))]
+    return aircraft.with_values({path: YAML(typ="safe", pure=True).load(value) for path, _, value in pairs})
 
 
 def cells(aircraft: Aircraft, speed: float) -> list[str]:

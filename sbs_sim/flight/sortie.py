@@ -18,7 +18,7 @@ from sbs_sim.flight.controls import Commands, check_rows, command
 from sbs_sim.flight.engine_failure import EngineFailure, failures_by_tick
 from sbs_sim.flight.formation import Flown, Formation
 from sbs_sim.flight.history import History, named_histories
-from sbs_sim.flight.power_balance import check_balance, named_balance, power_balance
+from sbs_sim.flight.power_balance import POWER_BALANCE, check_balance, named_balance, power_balance
 from sbs_sim.flight.records import Rows
 from sbs_sim.flight.simulation import Simulation, ground_level, ground_of
 from sbs_sim.flight.trim_point import TrimPoint
@@ -99,6 +99,10 @@ class Sortie:
         self._pilot = (Mixed if actuators else Direct)(aircraft, pilot_command, initial)
         angles = self._pilot.angles(pilot_command(0, 0.0), 0.0)
         self.simulation = Simulation(aircraft, state, angles, wind=air, **options)
+        if balanced and self.simulation.space is not None:
+            raise SimulationError(
+                f"outputs: {POWER_BALANCE!r}: allowed is air that is the same at all rotors and parts"
+            )
         self.ticks = round(duration / self.simulation.tick)
         check_rows(controls, self.ticks, self.simulation.tick)
         self.failures = failures_by_tick(self.simulation, events)

@@ -382,7 +382,7 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
             continue
         if aircraft.switches[0].section_options == 1:
             along = span_flow(blade, basis, motion, air_velocity, induced, gradient)
-            loads, terms.outward_force = optional_loads(
+            loads, terms.outward_force, _ = optional_loads(
                 *(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, along, pitch),
                 induced - air_velocity.z,
             )

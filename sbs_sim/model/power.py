@@ -69,6 +69,7 @@ from sbs_sim.model.offset import (
 )
 from sbs_sim.model.records import LANES
 from sbs_sim.model.section import SectionFlow, section_loads
+from sbs_sim.model.section_options import optional_loads, span_flow
 from sbs_sim.model.surfaces import fuselage_load, surface_load
 
 SUPPLY = ("engine", "actuators")
@@ -394,15 +395,26 @@ def air_powers(aircraft, memory, r, blade, inflow):
     record, terms, basis = aircraft.blades[r], memory.terms[r], blade.basis
     flow = SectionFlow(terms.u_t_hinge, terms.u_t_slope, terms.u_p_hinge, terms.u_p_slope)
     elements, air = aircraft.elements[record.elements], aircraft.air[0]
-    loads = section_loads(air, record, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, terms.pitch)
-    profile = -(
-        (flow.u_t_hinge * loads.forward_force + flow.u_t_slope * loads.forward_moment)
-        + (flow.u_p_hinge * loads.normal_force + flow.u_p_slope * loads.normal_moment)
+    outward = outward_moment = outward_profile = zeros_like(terms.pitch)
+    if aircraft.switches[0].section_options == 1:
+        along_span = span_flow(record, basis, blade.motion, blade.met, inflow.induced, inflow.gradient)
+        loads, outward, outward_moment = optional_loads(
+            *(air, record, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, along_span, terms.pitch),
+            inflow.induced - blade.met.z,
+        )
+        outward_profile = rounded(along_span.hinge * outward + along_span.slope * outward_moment)
+    else:
+        loads = section_loads(air, record, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, terms.pitch)
+    profile = (flow.u_t_hinge * loads.forward_force + flow.u_t_slope * loads.forward_moment) + (
+        flow.u_p_hinge * loads.normal_force + flow.u_p_slope * loads.normal_moment
     )
-    lift = rounded(basis.cos_flap * loads.normal_force)
-    moment = rounded(basis.cos_flap * (record.hinge_offset * loads.normal_force + loads.normal_moment))
+    cos_flap, sin_flap = basis.cos_flap, basis.span.z
+    normal_root = rounded(record.hinge_offset * loads.normal_force) + loads.normal_moment
+    outward_root = rounded(record.hinge_offset * outward) + outward_moment
+    lift = rounded(cos_flap * loads.normal_force + sin_flap * outward)
+    moment = rounded(cos_flap * normal_root + sin_flap * outward_root)
     force = basis.normal * loads.normal_force + Vector(ZERO, 1.0, ZERO) * loads.forward_force
-    return powers_of(inflow, lift, moment, rounded(profile), force)
+    return powers_of(inflow, lift, moment, rounded(-(profile + outward_profile)), force + basis.span * outward)
 
 
 @kernel

@@ -8,7 +8,7 @@ Helicopter Theory, section 5-12.
 import math
 from typing import Any, NamedTuple
 
-from sbs_sim.lanes import cross, dot, minimum, select, sqrt, table_row, zeros_like
+from sbs_sim.lanes import cross, dot, minimum, rounded, select, sqrt, table_row, zeros_like
 from sbs_sim.model.blade import to_blade
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.section import DEGREE, AirLoads, find_section
@@ -79,7 +79,7 @@ def set_tip_factors(blade, strip, through):
 
 @kernel
 def optional_loads(air, blade, elements, knots, table, strip, flow, along, pitch, through):
-    """Air loads of blades as those of `sbs_sim.model.section.section_loads`, and the force along the span, outwards.
+    """Air loads of blades as those of `sbs_sim.model.section.section_loads`; Int dF and Int s dF along the span.
 
     Parameters
     ----------
@@ -90,7 +90,8 @@ def optional_loads(air, blade, elements, knots, table, strip, flow, along, pitch
     set_tip_factors(blade, strip, through)
     for i in range(elements.shape[0]):
         find_section(blade, elements[i], knots, strip[i], flow, pitch)
-    normal_force = forward_force = normal_moment = forward_moment = outward_force = zeros_like(pitch)
+    normal_force = forward_force = normal_moment = forward_moment = zeros_like(pitch)
+    outward_force = outward_moment = zeros_like(pitch)
     for i in range(elements.shape[0]):
         element, section = elements[i], strip[i]
         s = element.span
@@ -107,4 +108,5 @@ def optional_loads(air, blade, elements, knots, table, strip, flow, along, pitch
         normal_force, forward_force = normal_force + up, forward_force - rearward
         normal_moment, forward_moment = normal_moment + s * up, forward_moment - s * rearward
         outward_force = outward_force - drag_gain * u_r
-    return AirLoads(normal_force, forward_force, normal_moment, forward_moment), outward_force
+        outward_moment = outward_moment - s * rounded(drag_gain * u_r)
+    return AirLoads(normal_force, forward_force, normal_moment, forward_moment), outward_force, outward_moment

@@ -34,14 +34,17 @@ def missing(found):
 
 
 OWN = {
+    "air": {"interference"},
     "ducts": {"duct"},
     "tails": {"surfaces", "actuators"},
     "drives": {"kinetic_drives"},
     "wakes": {"duct", "interference"},
 }
+SECTIONS = {"tip_loss_model": "prandtl", "profile_drag": "oblique", "descent": "measured", "induced_power_factor": 1.1}
 AIRCRAFT = {
     "sbs": lambda: Aircraft.load("sbs"),
     "ducts": lambda: build(every_rotor={"duct": DUCT}),
+    "air": lambda: build(options={"interference": "skewed_wake"}, every_rotor=SECTIONS),
     "shares": lambda: build(every_rotor={"duct_expansion": 0.8, "induced_power_factor": 1.15}),
     "drives": lambda: Aircraft.load(DATA / "electric.yaml"),
     "tails": lambda: Aircraft.load("uh60a_genhel"),

@@ -156,7 +156,7 @@ def _output_unit(model: LinearModel, name: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Transfer:
+class Transfer(ByContent):
     """One element of a transfer matrix, C (s - A)^-1 B + D, behind a delay.
 
     Attributes

@@ -213,7 +213,7 @@ COMPLETED = {
     "./run trim --me": ["--method"],
     "./run trim --method .": ["newton", "two_loop"],
     "./run linearize --exp": [],  # an older spelling
-    "./run trim --aircraft sbs_": ["sbs_paper"],
+    "./run trim --aircraft sbs_": ["sbs_ducted", "sbs_paper"],
     "./run trim --set body.mas": ["body.mass="],
     "./run batch --airspeed 5 --spread rotors.blade_m": ["rotors.blade_mass="],
     "./run sweep turn": ["turn_rate_deg"],

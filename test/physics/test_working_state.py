@@ -84,7 +84,7 @@ def test_shares_of_the_disc_are_those_of_its_sections(velocity, elements):
         assert stalled > 0.02 * area
         assert turned > 0.02 * area
         assert outside > 0.02 * area
-        assert out[j, 4:] == pytest.approx([stalled / area, turned / area, outside / area], abs=1e-12)
+        assert out[j, 4:7] == pytest.approx([stalled / area, turned / area, outside / area], abs=1e-12)
 
 
 @pytest.mark.parametrize("collective", [0.15, -0.15])

@@ -193,6 +193,7 @@ def test_the_definition_of_a_type_holds_all_types_in_it_once(ros):
         "MSG: geometry_msgs/Point",
         "MSG: geometry_msgs/Quaternion",
         "MSG: geometry_msgs/Vector3",
+        "MSG: sbs_msgs/ContactState",
         "MSG: std_msgs/Header",
         "MSG: builtin_interfaces/Time",
     ]

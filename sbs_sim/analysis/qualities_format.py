@@ -93,7 +93,9 @@ def boundaries(report: Qualities) -> list[str]:
         if name:
             limit = limits().by_name[name]
             words = [limit.paragraph, *([_oscillation(limit)] if limit.kind == OSCILLATION else [])]
-            read = "read in the standard" if limit.is_read else f"not read in the standard: after {limit.source}"
+            read = (
+                "read in the standard" if limit.is_read else f"not read in the standard; from memory of {limit.source}"
+            )
             lines.append("; ".join([*words, read, *([limit.remark] if limit.remark else [])]))
     return lines
 

@@ -6,7 +6,7 @@ Their equations are compared with the plain model in test_dynamics; here is what
 import numpy as np
 import pytest
 from balances import at_speeds, azimuths, rates_of_totals, totals
-from helpers import VACUUM, WEIGHTLESS_VACUUM, Model, aircraft_data, unit
+from helpers import OFFSET_BLADE, VACUUM, WEIGHTLESS_VACUUM, Model, aircraft_data, unit
 from plain_model import first_moment, make_blades, plain_derivative, split_state
 
 from sbs_sim import Aircraft, trim
@@ -18,22 +18,12 @@ from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 
 G = 9.80665
-BLADE = {
-    "quarter_chord": {"stations": [0.2, 0.7, 1.0], "values": [0.004, 0.008, -0.04]},
-    "chordwise_cg": {"stations": [0.1, 0.7, 1.0], "values": [0.012, 0.006, -0.03]},
-    "twist_deg": {"root": 6.0, "tip": -4.0},
-    "flap_hinge_offset": 0.03,
-    "lag_spring": 20.0,
-    "lag_damping": 0.3,
-    "pitch_flap_coupling": 0.4,
-    "pitch_lag_coupling": -0.2,
-}
-TEETERING = BLADE | {"blades": 2, "hinge_offset": 0.0, "flap_hinge_offset": 0.0, "flap_hinge": "teetering"}
+TEETERING = OFFSET_BLADE | {"blades": 2, "hinge_offset": 0.0, "flap_hinge_offset": 0.0, "flap_hinge": "teetering"}
 TEETERING |= {"undersling": 0.03, "flap_rest_deg": 3.0}
 ROTORS = {
     "hinges of each blade": [
-        BLADE | {"shaft_direction": unit(0.1, -0.2, -1.0), "blades": 4},
-        BLADE | {"shaft_direction": unit(-0.2, 0.3, -0.9), "blades": 5, "speed_rpm": 2100.0},
+        OFFSET_BLADE | {"shaft_direction": unit(0.1, -0.2, -1.0), "blades": 4},
+        OFFSET_BLADE | {"shaft_direction": unit(-0.2, 0.3, -0.9), "blades": 5, "speed_rpm": 2100.0},
         {"hub": [-1.2, 0.1, -0.2], "shaft_direction": [0.0, 1.0, 0.0], "speed_rpm": 3600.0, "blade_mass": 0.05},
     ],
     "teetering, underslung": [
@@ -170,7 +160,7 @@ def test_an_underslung_rotor_leaves_its_hub_at_rest():
 
 def test_a_distribution_of_mass_has_its_own_moments():
     """A table of mass with a step and a tip mass, and offsets by tables, against the plain model."""
-    data = aircraft_data(rotors=[BLADE, BLADE], options={"elements": 5})
+    data = aircraft_data(rotors=[OFFSET_BLADE, OFFSET_BLADE], options={"elements": 5})
     for rotor in data["rotors"]:
         for key in ("blade_mass", "blade_cg"):
             del rotor[key]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from aircraft_laws import instant
 from balances import balance, totals
-from helpers import aircraft_data, build, unit
+from helpers import OFFSET_BLADE, aircraft_data, build, unit
 from random_options import equipped_flights
 
 from sbs_sim import Aircraft, Case, simulate, simulate_batch, trim
@@ -82,17 +82,7 @@ def test_the_balance_closes_without_lag_or_cyclic_inflow(fidelity):
     assert missing(manoeuvre(AIRCRAFT["sbs"](), 10.0, 0.2, **fidelity)) < CLOSED * hover_power("sbs")
 
 
-OFFSETS = {
-    "quarter_chord": {"stations": [0.2, 0.7, 1.0], "values": [0.004, 0.008, -0.04]},
-    "chordwise_cg": {"stations": [0.1, 0.7, 1.0], "values": [0.012, 0.006, -0.03]},
-    "twist_deg": {"root": 6.0, "tip": -4.0},
-    "flap_hinge_offset": 0.03,
-    "lag_spring": 20.0,
-    "lag_damping": 0.3,
-    "pitch_flap_coupling": 0.4,
-    "pitch_lag_coupling": -0.2,
-    "lag_stop": {"range_deg": [-0.5, 0.5], "stiffness": 100.0, "damping": 0.1},
-}
+OFFSETS = OFFSET_BLADE | {"lag_stop": {"range_deg": [-0.5, 0.5], "stiffness": 100.0, "damping": 0.1}}
 TEETERING = {
     "blades": 2,
     "hinge_offset": 0.0,

@@ -31,6 +31,18 @@ TEST_STAND = {
     "flat_plate_areas": [0.0, 0.0, 0.0],
 }
 
+# A rotor's blades, swept at the tip and with their mass beside the pitch axis.
+OFFSET_BLADE = {
+    "quarter_chord": {"stations": [0.2, 0.7, 1.0], "values": [0.004, 0.008, -0.04]},
+    "chordwise_cg": {"stations": [0.1, 0.7, 1.0], "values": [0.012, 0.006, -0.03]},
+    "twist_deg": {"root": 6.0, "tip": -4.0},
+    "flap_hinge_offset": 0.03,
+    "lag_spring": 20.0,
+    "lag_damping": 0.3,
+    "pitch_flap_coupling": 0.4,
+    "pitch_lag_coupling": -0.2,
+}
+
 
 @functools.cache
 def _aircraft_file(name):

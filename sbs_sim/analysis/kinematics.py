@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.model import state as S
 from sbs_sim.model.elementary import cosine_and_sine
+from sbs_sim.model.frames import cross_matrix
 from sbs_sim.model.solve import product, solve
 
 Array = NDArray[np.float64]
@@ -38,12 +39,12 @@ def kinematics(state: Array, inertia: Array, gravity: float) -> Array:
     axis = [S.LINEAR_U, S.LINEAR_V, S.LINEAR_W]
     turn = [S.LINEAR_P, S.LINEAR_Q, S.LINEAR_R]
     a = np.zeros((S.LINEAR_BODY_SIZE, S.LINEAR_BODY_SIZE))
-    a[np.ix_(axis, axis)] = -_cross(rates)
-    a[np.ix_(axis, turn)] = _cross(velocity)
+    a[np.ix_(axis, axis)] = -cross_matrix(rates)
+    a[np.ix_(axis, turn)] = cross_matrix(velocity)
     a[axis, S.LINEAR_THETA] = -g * ct, -g * sp * st, -g * cp * st
     a[axis, S.LINEAR_PHI] = 0.0, g * cp * ct, -g * sp * ct
     momentum = product(inertia, rates[:, np.newaxis])[:, 0]
-    gyroscopic = product(_cross(rates), inertia) - _cross(momentum)
+    gyroscopic = product(cross_matrix(rates), inertia) - cross_matrix(momentum)
     a[np.ix_(turn, turn)] = -solve(inertia, gyroscopic)
     heading = q * sp + r * cp  # psi' cos theta
     a[S.LINEAR_THETA, [S.LINEAR_Q, S.LINEAR_R]] = cp, -sp
@@ -52,9 +53,3 @@ def kinematics(state: Array, inertia: Array, gravity: float) -> Array:
     a[S.LINEAR_PHI, S.LINEAR_THETA] = heading / (ct * ct)
     a[S.LINEAR_PHI, S.LINEAR_PHI] = (q * cp - r * sp) * st / ct
     return a
-
-
-def _cross(vector: Array) -> Array:
-    """Matrix of the cross product from the left."""
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -16,7 +16,7 @@ from sbs_sim.errors import SimulationError
 from sbs_sim.flight.trimmed_state import slowed
 from sbs_sim.model import state as S
 from sbs_sim.model.contact import CONTACT_SIZE, contact_forces
-from sbs_sim.model.frames import euler_to_quaternion, rotation_matrix
+from sbs_sim.model.frames import cross_matrix, euler_to_quaternion, rotation_matrix
 from sbs_sim.model.integrate import STAGES, TABLEAUS
 from sbs_sim.model.records import Model
 
@@ -82,19 +82,14 @@ def _matrices(aircraft: Aircraft) -> tuple[Array, Array, Array]:
         mass, first, inertia = aircraft.fuselage()
     else:
         mass, first, inertia = aircraft.body.mass, np.zeros(3), aircraft.body.inertia
-    matrix = np.block([[mass * np.eye(3), -_cross(first)], [_cross(first), inertia]])
+    matrix = np.block([[mass * np.eye(3), -cross_matrix(first)], [cross_matrix(first), inertia]])
     stiffness, damping = np.zeros((6, 6)), np.zeros((6, 6))
     for point in aircraft.contact_points:
-        motion = np.hstack([np.eye(3), -_cross(point.position)])
+        motion = np.hstack([np.eye(3), -cross_matrix(point.position)])
         side_stiffness, side_damping = point.sideways
         stiffness += max(point.stiffness, side_stiffness) * (motion.T @ motion)
         damping += max(point.damping, side_damping) * (motion.T @ motion)
     return matrix, stiffness, damping
-
-
-def _cross(vector: Array) -> Array:
-    x, y, z = vector.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _is_stable(mass: Array, stiffness: Any, damping: Any, method: int, step: float) -> bool:

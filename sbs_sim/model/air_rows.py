@@ -13,6 +13,7 @@ from sbs_sim.model.kernel import kernel
 from sbs_sim.model.offset import Flow
 from sbs_sim.model.records import GUST_ROWS, Model
 from sbs_sim.model.section import SectionFlow
+from sbs_sim.model.state import vector_at
 
 CG_ROWS, PART_ROWS = 3, 3
 AT_HUB, ALONG_X, ALONG_Y = 0, 3, 6  # first rows of those of a rotor
@@ -32,15 +33,13 @@ def in_space(air):
 @kernel
 def gust_of_rotor(air, j):
     """Velocity of the air at the hub of a rotor less that at the c.g., hub axes [m/s]."""
-    first = CG_ROWS + GUST_ROWS * j
-    return Vector(air[first], air[first + 1], air[first + 2])
+    return vector_at(air, CG_ROWS + GUST_ROWS * j)
 
 
 @kernel
 def gust_of_part(aircraft, air, i):
     """Velocity of the air at a surface, or behind them the fuselage, less that at the c.g., body axes [m/s]."""
-    first = CG_ROWS + GUST_ROWS * aircraft.rotors.shape[0] + PART_ROWS * i
-    return Vector(air[first], air[first + 1], air[first + 2])
+    return vector_at(air, CG_ROWS + GUST_ROWS * aircraft.rotors.shape[0] + PART_ROWS * i)
 
 
 @kernel

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim.content import ByContent
 from sbs_sim.errors import AirfoilError
+from sbs_sim.model.cubics import bounded_slopes
 from sbs_sim.model.elementary import cosine_and_sine
 
 Array = NDArray[np.float64]
@@ -589,16 +590,8 @@ def _cut(powers: Array, steps: NDArray[np.int64]) -> Array:
 
 
 def _monotone_slopes(rise: Array, steps: Array) -> Array:
-    """Slopes at the beginning of every interval, per step; the intervals go round the circle.
-
-    That of the parabola through three points, the mean of the rises per step on both sides where the steps are even,
-    and not more than three times the smaller: section 4 of Fritsch and Carlson. Zero at a maximum or minimum.
-    """
-    before, steps_before = np.roll(rise, 1, axis=1), np.roll(steps, 1)
-    limit = 3.0 * np.minimum(np.abs(before), np.abs(rise))
-    mean = (steps * before + steps_before * rise) / (steps_before + steps)
-    limited = np.where(np.abs(mean) > limit, np.copysign(limit, mean), mean)
-    return np.where(before * rise > 0.0, limited, 0.0)
+    """Monotone slopes at the beginning of every interval, per step; the intervals go round the circle."""
+    return bounded_slopes(np.roll(rise, 1, axis=1), np.roll(steps, 1), rise, steps)
 
 
 def cell_grid(table: AirfoilTable | Grid) -> tuple[int, float, float]:

@@ -8,6 +8,7 @@ that the dynamic inflow stays explicit in its states.
 import numpy as np
 
 from sbs_sim.lanes import maximum, minimum, rounded, select, zeros_like
+from sbs_sim.model.cubics import bounded_slopes, pieces
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.trigonometry import TINY
 
@@ -29,16 +30,9 @@ def _curve() -> tuple[tuple[float, ...], tuple[tuple[float, float, float, float]
     y = np.append(1.0 / inflow**2, WINDMILL - 1.0)
     width = np.diff(x)
     rise = np.diff(y) / width
-    slope = np.array([-1.0, *np.zeros(len(x) - 2), 1.0])  # of momentum theory at both ends
-    for k in range(1, len(x) - 1):
-        before, after = rise[k - 1], rise[k]
-        if before * after > 0.0:  # the parabola through three points, bounded so that the curve stays monotone
-            mean = (before * width[k] + after * width[k - 1]) / (width[k] + width[k - 1])
-            slope[k] = np.sign(mean) * min(abs(mean), 3.0 * min(abs(before), abs(after)))
-    square = (3.0 * rise - 2.0 * slope[:-1] - slope[1:]) / width
-    cube = (slope[:-1] + slope[1:] - 2.0 * rise) / width**2
-    pieces = zip(y[:-1].tolist(), slope[:-1].tolist(), square.tolist(), cube.tolist(), strict=True)
-    return tuple(x.tolist()), tuple(pieces)
+    inner = bounded_slopes(rise[:-1], width[:-1], rise[1:], width[1:])
+    slope = np.array([-1.0, *inner, 1.0])  # of momentum theory at both ends
+    return tuple(x.tolist()), tuple(map(tuple, pieces(x, y, slope).tolist()))
 
 
 KNOTS, PIECES = _curve()

@@ -275,14 +275,13 @@ def set_known_loads(aircraft, memory, flight, swash, psi):
     if aircraft.switches[0].scheduled == 1:
         set_commands(aircraft, memory, flight, swash)
         commands = memory.commands
+    set_hub_velocities(aircraft, memory, flight)
     if aircraft.switches[0].wash == 1:
-        set_hub_velocities(aircraft, memory, flight)
         set_wash(aircraft, memory)
         if aircraft.switches[0].ground_effect > 0:
             add_ground_wash(aircraft, memory, flight)
     set_blade_terms(aircraft, memory, flight, commands, psi)
     sum_blades(aircraft, memory)
-    set_hub_velocities(aircraft, memory, flight)
     return body_loads(aircraft, memory, flight, commands)
 
 
@@ -414,13 +413,28 @@ def induced_velocity(aircraft, memory, blade, pose):
     lambda0 = spread(x, inflow[S.UNIFORM], quad, blade)
     lambdas, lambdac = spread(x, inflow[S.SINE], quad, blade), spread(x, inflow[S.COSINE], quad, blade)
     if aircraft.switches[0].wash == 1:
-        wash, rotor = memory.wash, aircraft.indices.azimuth
-        lambda0 = lambda0 + spread(wash[S.UNIFORM], rotor, quad, blade)
-        lambdas = lambdas + spread(wash[S.SINE], rotor, quad, blade)
-        lambdac = lambdac + spread(wash[S.COSINE], rotor, quad, blade)
-    sine_part = lambdas * pose.sine
-    gradient = blade.inflow_speed * (lambdac * pose.cosine + sine_part)
-    return blade.inflow_speed * blade.radius * lambda0, gradient
+        wash = wash_of_blade(aircraft, memory, blade)
+        lambda0, lambdas, lambdac = lambda0 + wash.uniform, lambdas + wash.sine, lambdac + wash.cosine
+    return velocity_of_inflow(blade, pose, Inflow(lambda0, lambdac, lambdas))
+
+
+@kernel
+def wash_of_blade(aircraft, memory, blade):
+    """What others add to the inflow that blades meet."""
+    wash, rotor, quad = memory.wash, aircraft.indices.azimuth, blade.quad
+    return Inflow(
+        spread(wash[S.UNIFORM], rotor, quad, blade),
+        spread(wash[S.COSINE], rotor, quad, blade),
+        spread(wash[S.SINE], rotor, quad, blade),
+    )
+
+
+@kernel
+def velocity_of_inflow(blade, pose, inflow):
+    """Velocity of an inflow at the hub [m/s], and its slope along the radius at the azimuth of blades [1/s]."""
+    sine_part = inflow.sine * pose.sine
+    gradient = blade.inflow_speed * (inflow.cosine * pose.cosine + sine_part)
+    return blade.inflow_speed * blade.radius * inflow.uniform, gradient
 
 
 @kernel
@@ -514,12 +528,7 @@ def set_offset_equations(aircraft, memory, r, pose, basis, motion, air_loads, at
     moments = HingeMoments(moments.flap - share * moments.lag, moments.lag, inverse_lag_inertia)
     inverse_flap_inertia = inverse_where(blade.mass, found.flap_inertia - share * found.flap_lag)
     known, column = about_cg(blade, basis, found.known), about_cg(blade, basis, found.pitch)
-    terms.cosine, terms.sine = pose.cosine, pose.sine
-    terms.flap_column_force, terms.flap_column_moment = flap.force, flap.moment
-    terms.lag_column_force, terms.lag_column_moment = lag.force, lag.moment
-    terms.flap_moment, terms.lag_moment = moments.flap, moments.lag
-    terms.inverse_lag_inertia = inverse_lag_inertia
-    terms.known_force, terms.known_moment = known.force, known.moment
+    set_terms(terms, pose, moments, flap, lag, known, inverse_lag_inertia)
     own.slope, own.column_force, own.column_moment = turning.slope, column.force, column.moment
     own.moment, own.inertia = found.moments[2], found.pitch_inertia
     own.flap_coupling, own.lag_coupling = found.flap_pitch - share * found.lag_pitch, found.lag_pitch
@@ -554,12 +563,7 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
         on_hub = with_outward_force(basis, on_hub, terms.outward_force)
     known = about_cg(blade, basis, on_hub)
     inverse_lag_inertia = blade.lead_lag * moments.inverse_lag_inertia
-    terms.cosine, terms.sine = pose.cosine, pose.sine
-    terms.flap_column_force, terms.flap_column_moment = flap.force, flap.moment
-    terms.lag_column_force, terms.lag_column_moment = lag.force, lag.moment
-    terms.flap_moment, terms.lag_moment = moments.flap, moments.lag
-    terms.inverse_lag_inertia = inverse_lag_inertia
-    terms.known_force, terms.known_moment = known.force, known.moment
+    set_terms(terms, pose, moments, flap, lag, known, inverse_lag_inertia)
     if aircraft.switches[0].complete_hub_moment == 0:
         terms.paper_moment, terms.flap_axis = paper_moment(blade, basis, pose, loads)
     thrust = rounded(basis.cos_flap * loads.normal_force)
@@ -570,6 +574,17 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
     add_to_sums(
         memory, blade, pose, thrust, root_moment, inertia, moments, flap, lag, known, inverse, inverse_lag_inertia
     )
+
+
+@kernel
+def set_terms(terms, pose, moments, flap, lag, known, inverse_lag_inertia):
+    """Keep what the accelerations of blades follow from: the columns about the c.g., hinge moments, known loads."""
+    terms.cosine, terms.sine = pose.cosine, pose.sine
+    terms.flap_column_force, terms.flap_column_moment = flap.force, flap.moment
+    terms.lag_column_force, terms.lag_column_moment = lag.force, lag.moment
+    terms.flap_moment, terms.lag_moment = moments.flap, moments.lag
+    terms.inverse_lag_inertia = inverse_lag_inertia
+    terms.known_force, terms.known_moment = known.force, known.moment
 
 
 @kernel
@@ -1073,9 +1088,10 @@ def flow_of_duct(aircraft, memory, j):
     """Thrusts of a rotor and of its duct; the wash of other rotors is part of the air that comes to them."""
     rotor, uniform = aircraft.rotors[j], memory.state[aircraft.rotors[j].inflow + S.UNIFORM]
     mu = memory.flow[j].velocity * rotor.inverse_tip_speed
-    flow = duct_flow(rotor, uniform, mu)
     if aircraft.switches[0].wash == 1:
         flow = duct_flow(rotor, uniform, met_with_wash(memory, j, mu))
+    else:
+        flow = duct_flow(rotor, uniform, mu)
     return flow
 
 

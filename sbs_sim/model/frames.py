@@ -22,6 +22,12 @@ Array = NDArray[np.float64]
 ONE = np.zeros(1, [("lanes", float, (1,))])  # record of a single lane
 
 
+def cross_matrix(vector: Array) -> Array:
+    """Matrix of the cross product from the left, shape (3, 3)."""
+    x, y, z = vector.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
 def euler_to_quaternion(yaw: float, pitch: float, roll: float) -> Array:
     """Quaternion (w, x, y, z), body to earth, of Euler angles [rad] (Stevens and Lewis, section 1.3)."""
     quaternion = np.empty((4, 1))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sbs_sim.lanes import dot, maximum, minimum, rounded, select, sqrt, transposed
 from sbs_sim.model import state as S
+from sbs_sim.model.cubics import pieces
 from sbs_sim.model.frames import shaft_down
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.trigonometry import TINY
@@ -31,9 +32,7 @@ def monotone_cubics(points: NDArray[np.float64]) -> NDArray[np.float64]:
     slope[0] = secant[0]
     first, second = 2.0 * width[1:] + width[:-1], width[1:] + 2.0 * width[:-1]
     slope[1:-1] = (first + second) / (first / secant[:-1] + second / secant[1:])
-    square = (3.0 * secant - 2.0 * slope[:-1] - slope[1:]) / width
-    cube = (slope[:-1] + slope[1:] - 2.0 * secant) / (width * width)
-    return np.stack([points[:-1, 1], slope[:-1], square, cube], axis=1)
+    return pieces(points[:, 0], points[:, 1], slope)
 
 
 CUBICS = monotone_cubics(CURVE)

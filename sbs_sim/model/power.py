@@ -50,7 +50,9 @@ from sbs_sim.model.dynamics import (
     rates_of_inflow,
     stand_loads,
     times,
+    velocity_of_inflow,
     wash_at,
+    wash_of_blade,
     with_rotors,
 )
 from sbs_sim.model.fuselage import plate_drag
@@ -376,7 +378,8 @@ def inflow_of(aircraft, memory, record, blade):
     induced, gradient = induced_velocity(aircraft, memory, record, blade.pose)
     wash, wash_gradient = zeros_like(blade.pose.beta), zeros_like(blade.pose.beta)
     if aircraft.switches[0].wash == 1:
-        wash, wash_gradient = wash_velocity(aircraft, memory, record, blade.pose)
+        at_hub, slope = velocity_of_inflow(record, blade.pose, wash_of_blade(aircraft, memory, record))
+        wash, wash_gradient = rounded(at_hub), rounded(slope)
     return Met(rounded(induced), rounded(gradient), wash, wash_gradient)
 
 
@@ -471,15 +474,6 @@ def hinge_powers(aircraft, record, terms, blade, commands):
         stops = with_lag_stops(record, pose, HingeMoments(zero, zero, zero)).lag * record.lead_lag
         springs = rounded(springs - stops * pose.xi_rate)
     return HingePowers(springs, dampers, actuators)
-
-
-@kernel
-def wash_velocity(aircraft, memory, blade, pose):
-    """What the wash adds to `induced_velocity`."""
-    wash, rotor, quad = memory.wash, aircraft.indices.azimuth, blade.quad
-    sine_part = spread(wash[S.SINE], rotor, quad, blade) * pose.sine
-    gradient = blade.inflow_speed * (spread(wash[S.COSINE], rotor, quad, blade) * pose.cosine + sine_part)
-    return rounded(blade.inflow_speed * blade.radius * spread(wash[S.UNIFORM], rotor, quad, blade)), rounded(gradient)
 
 
 # --- rotors -----------------------------------------------------------------------------------------------------

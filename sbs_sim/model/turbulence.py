@@ -18,9 +18,9 @@ from sbs_sim.model.air_field import KARMAN, VON_KARMAN
 from sbs_sim.model.elementary import cosine_and_sine, exponential, power
 from sbs_sim.model.kernel import entry
 from sbs_sim.model.noise import normal
+from sbs_sim.model.solve import product
 
 Array = NDArray[np.float64]
-Rows = list[list[float]]
 
 Polynomials = tuple[tuple[float, ...], tuple[float, ...]]  # numerator and denominator: coefficients of 1, s, s^2, ...
 
@@ -38,11 +38,11 @@ PITCH_LAG, ROLL_LAG, YAW_LAG = 4.0 / math.pi, 4.0 / math.pi, 3.0 / math.pi  # sp
 class Component(NamedTuple):
     """A component in discrete time: states x <- transition x + factor noise, velocity and rate by rows."""
 
-    transition: Rows
-    factor: Rows
-    start: Rows
-    velocity: list[float]
-    rate: list[float]
+    transition: Array
+    factor: Array
+    start: Array
+    velocity: Array
+    rate: Array
 
 
 class FilteredTurbulence:
@@ -130,8 +130,8 @@ def component(
         numerator, denominator = PADE
         gain = sigma * math.sqrt((2.0 if along else 1.0) / KARMAN)
         if not along:
-            numerator = _product(numerator, (1.0, math.sqrt(8.0 / 3.0)))
-            denominator = _product(denominator, (1.0, 1.0))
+            numerator = _polynomial_product(numerator, (1.0, math.sqrt(8.0 / 3.0)))
+            denominator = _polynomial_product(denominator, (1.0, 1.0))
     else:
         scale, gain = length, sigma
         numerator, denominator = DRYDEN_ALONG if along else DRYDEN_ACROSS
@@ -147,108 +147,75 @@ def discretised(
     """
     order = len(denominator) - 1
     size = order + 1 if lag > 0.0 else order
-    a = [[0.0] * size for _ in range(size)]
-    for i in range(order - 1):
-        a[i][i + 1] = 1.0
-    a[order - 1][:order] = [-value / denominator[-1] for value in denominator[:-1]]
-    velocity = [0.0] * size
-    velocity[: len(numerator)] = [value / denominator[-1] for value in numerator]
-    rate = [0.0] * size
+    a = np.eye(size, k=1)
+    a[order - 1 :] = 0.0
+    a[order - 1, :order] = -np.array(denominator[:-1]) / denominator[-1]
+    velocity, rate = np.zeros(size), np.zeros(size)
+    velocity[: len(numerator)] = np.array(numerator) / denominator[-1]
     if lag > 0.0:
         share = scale / lag
-        a[order] = [share * value for value in velocity[:order]] + [-share]
-        rate = [value / lag for value in velocity[:order]] + [-1.0 / lag]
-    drive = [[0.0] * size for _ in range(size)]
-    drive[order - 1][order - 1] = 1.0
+        a[order, :order], a[order, order] = share * velocity[:order], -share
+        rate[:order], rate[order] = velocity[:order] / lag, -1.0 / lag
+    drive = np.zeros((size, size))
+    drive[order - 1, order - 1] = 1.0
     transition, noise = exact_step(a, drive, step)
     start = _stationary(transition, noise)
-    return Component(
-        transition,
-        _cholesky(noise),
-        _cholesky(start),
-        [gain * value for value in velocity],
-        [gain * value for value in rate],
-    )
+    return Component(transition, _cholesky(noise), _cholesky(start), gain * velocity, gain * rate)
 
 
-def exact_step(a: Rows, drive: Rows, step: float) -> tuple[Rows, Rows]:
+def exact_step(a: Array, drive: Array, step: float) -> tuple[Array, Array]:
     """Transition exp(a h) over a step h, and the covariance that noise of density `drive` adds in it.
 
     From a series for a small step, doubled as often as it takes. C. F. Van Loan: Computing integrals involving the
     matrix exponential, IEEE Transactions on Automatic Control 23 (3), 1978, gives the covariance as a product.
     """
     size = len(a)
-    norm, halvings = step * max(sum(map(abs, row)) for row in a), 0
+    norm, halvings = step * float(np.abs(a).sum(axis=1).max()), 0
     while norm > SMALL:
         norm, halvings = 0.5 * norm, halvings + 1
     h = step / 2.0**halvings
-    block = [[-h * value for value in a[i]] + [h * value for value in drive[i]] for i in range(size)]
-    block += [[0.0] * size + [h * a[j][i] for j in range(size)] for i in range(size)]
-    power_of_block = total = _identity(2 * size)
+    block = np.block([[-h * a, h * drive], [np.zeros((size, size)), h * a.T]])
+    power_of_block = total = np.eye(2 * size)
     for k in range(1, SERIES):
-        power_of_block = [[value / k for value in row] for row in _times(power_of_block, block)]
-        total = _plus(total, power_of_block)
-    transition = _transposed([row[size:] for row in total[size:]])
-    noise = _times(transition, [row[size:] for row in total[:size]])
+        power_of_block = product(power_of_block, block) / k
+        total = total + power_of_block
+    transition = total[size:, size:].T
+    noise = product(transition, total[:size, size:])
     for _ in range(halvings):
         transition, noise = _doubled(transition, noise)
     return transition, noise
 
 
-def _stationary(transition: Rows, noise: Rows) -> Rows:
+def _stationary(transition: Array, noise: Array) -> Array:
     for _ in range(DOUBLINGS):
-        if max(abs(value) for row in transition for value in row) < 1e-20:
+        if np.abs(transition).max() < 1e-20:
             break
         transition, noise = _doubled(transition, noise)
     return noise
 
 
-def _doubled(transition: Rows, noise: Rows) -> tuple[Rows, Rows]:
-    more = _times(_times(transition, noise), _transposed(transition))
-    return _times(transition, transition), _plus(noise, more)
+def _doubled(transition: Array, noise: Array) -> tuple[Array, Array]:
+    more = product(product(transition, noise), transition.T)
+    return product(transition, transition), noise + more
 
 
-def _cholesky(matrix: Rows) -> Rows:
+def _cholesky(matrix: Array) -> Array:
     """Lower factor of a symmetric matrix; what is lost in rounding of its diagonal counts as zero."""
     size = len(matrix)
-    factor = [[0.0] * size for _ in range(size)]
+    factor = np.zeros((size, size))
     for i in range(size):
         for j in range(i + 1):
-            rest = matrix[i][j]
+            rest = matrix[i, j]
             for k in range(j):
-                rest -= factor[i][k] * factor[j][k]
+                rest -= factor[i, k] * factor[j, k]
             if i == j:
-                factor[i][i] = math.sqrt(max(0.0, rest))
-            elif factor[j][j] > 0.0:
-                factor[i][j] = rest / factor[j][j]
+                factor[i, i] = math.sqrt(max(0.0, rest))
+            elif factor[j, j] > 0.0:
+                factor[i, j] = rest / factor[j, j]
     return factor
 
 
-def _identity(size: int) -> Rows:
-    return [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
-
-
-def _times(a: Rows, b: Rows) -> Rows:
-    columns = _transposed(b)
-    return [[_dot(row, column) for column in columns] for row in a]
-
-
-def _dot(a: list[float], b: list[float]) -> float:
-    total = 0.0  # from the left to the right: newer `sum` compensates
-    for x, y in zip(a, b, strict=True):
-        total += x * y
-    return total
-
-
-def _plus(a: Rows, b: Rows) -> Rows:
-    return [[x + y for x, y in zip(row, other, strict=True)] for row, other in zip(a, b, strict=True)]
-
-
-def _transposed(a: Rows) -> Rows:
-    return [list(column) for column in zip(*a, strict=True)]
-
-
-def _product(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, ...]:
+def _polynomial_product(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, ...]:
     """Coefficients of the product of two polynomials."""
     found = [0.0] * (len(a) + len(b) - 1)
     for i, x in enumerate(a):
@@ -257,10 +224,9 @@ def _product(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(found)
 
 
-def _padded(values: list[float] | Rows) -> Array:
+def _padded(values: Array) -> Array:
     """Numbers with zeros for the states that are not there."""
-    given = np.array(values)
-    return np.pad(given, [(0, STATES - size) for size in given.shape])
+    return np.pad(values, [(0, STATES - size) for size in values.shape])
 
 
 @entry

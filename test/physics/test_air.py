@@ -358,7 +358,7 @@ def test_a_step_is_exact_however_long_it_is():
     drive = np.diag([0.0, 0.0, 0.0, 1.0])
     stationary = solve_continuous_lyapunov(a, -drive)
     for step in (1e-4, 0.1, 3.0):
-        transition, noise = T.exact_step(a.tolist(), drive.tolist(), step)
+        transition, noise = T.exact_step(a, drive, step)
         np.testing.assert_allclose(transition, expm(step * a), rtol=1e-10, atol=1e-14)
         expected = stationary - expm(step * a) @ stationary @ expm(step * a).T
         np.testing.assert_allclose(noise, expected, rtol=1e-7, atol=1e-12)

@@ -369,8 +369,8 @@ class Aircraft(Description):
 
     @property
     def rotor_span(self) -> float:
-        """Distance across from tip to tip of the rotors, their discs level [m]."""
-        sides = [(rotor.hub[1] - rotor.radius, rotor.hub[1] + rotor.radius) for rotor in self.rotors]
+        """Distance in y of the outermost blade tips, rotors taken as circles [m]."""
+        sides = [(rotor.hub[1] - rotor.reach, rotor.hub[1] + rotor.reach) for rotor in self.rotors]
         return float(max(right for _, right in sides) - min(left for left, _ in sides))
 
     @cached_property

@@ -867,6 +867,12 @@ class Rotor(ByContent):
         return np.searchsorted(stations, (self.hinge_offset + np.asarray(span)) / self.radius, side="right")
 
     @property
+    def reach(self) -> float:
+        """Half the extent in y of the circle of the tips, whose axis may be tilted [m]."""
+        shaft = self.shaft_direction / np.linalg.norm(self.shaft_direction)
+        return float(self.radius * math.sqrt(max(0.0, 1.0 - float(shaft[1]) ** 2)))
+
+    @property
     def mean_chord(self) -> float:
         """Mean chord from the flap hinge to the tip [m]."""
         if self.chord_stations is None:

@@ -16,7 +16,7 @@ from scipy.optimize import linear_sum_assignment
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.differences import difference_steps, jacobians, used_states
-from sbs_sim.analysis.periodic import Period, common_period
+from sbs_sim.analysis.periodic import Period, common_period, flown_period
 from sbs_sim.content import ByContent
 from sbs_sim.errors import LinearizationError
 from sbs_sim.flight.trim_point import Fidelity, TrimPoint
@@ -94,8 +94,8 @@ def floquet(aircraft: Aircraft, point: TrimPoint, azimuth_count: int = 48) -> Fl
         A count out of range, rotors whose blade passages have no common period, drives that do not join all rotors, or
         a stand.
     """
-    period, _ = checked_period(aircraft)
-    period *= aircraft.rotors[0].speed / float(point.rotor_speed[0])
+    checked_period(aircraft)
+    period = flown_period(aircraft, point)
     least, most = AZIMUTH_COUNTS
     if not least <= azimuth_count <= most or azimuth_count % 2:
         raise LinearizationError(f"azimuth_count = {azimuth_count}: allowed are even numbers from {least} to {most}")

@@ -62,6 +62,11 @@ def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
     raise LinearizationError(f"the blade passages of the rotors have no common period of up to {MAX_PASSAGES} of them")
 
 
+def flown_period(aircraft: Aircraft, point: TrimPoint) -> float:
+    """Common period with the speed that the rotors have in a trim [s]; see `common_period`."""
+    return common_period(aircraft)[0] * aircraft.rotors[0].speed / float(point.rotor_speed[0])
+
+
 class Period:
     """The common period of the rotors of an aircraft, flown from many states at once with Runge-Kutta's method.
 

@@ -10,6 +10,7 @@ from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.power_balance import check_balance, power_balance
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import trimmed_state
+from sbs_sim.flight.two_blades import has_two_blades
 from sbs_sim.model.average import azimuths
 from sbs_sim.model.power import POWER_TERMS
 
@@ -36,7 +37,7 @@ def power_shares(aircraft: Aircraft, point: TrimPoint) -> dict[str, float]:
         state.
     """
     check_balance(aircraft)
-    if any(rotor.blades == 2 for rotor in aircraft.rotors):
+    if has_two_blades(aircraft):
         raise SimulationError("power of a trim: allowed are three or more blades; `simulate` has that of two")
     engine = Engine(aircraft.arranged(point.lead_lag, point.cyclic_inflow, "blades"))
     angles = azimuths(aircraft.passages, point.azimuth_count)

@@ -12,15 +12,12 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from sbs_sim import checks
 from sbs_sim.config_file import config_folder, read_yaml
 from sbs_sim.errors import LinearizationError
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
-    from sbs_sim.aircraft.description import Rotor
     from sbs_sim.analysis.modes import Mode
 
 FILE = "flying_qualities.yaml"
@@ -193,21 +190,6 @@ class Scale:
         return f"{self.name} {self.length:.4g} m for {self.reference:.4g} m: frequencies x {self.speed_up:.3g}"
 
 
-def lateral_span(aircraft: Aircraft) -> float:
-    """Distance in y of the outermost blade tips of an aircraft, rotors taken as circles [m]."""
-    sides = [(rotor.hub[1] - _reach(rotor), rotor.hub[1] + _reach(rotor)) for rotor in aircraft.rotors]
-    return float(max(right for _, right in sides) - min(left for left, _ in sides))
-
-
-def _reach(rotor: Rotor) -> float:
-    """Half the extent in y of the circle of the tips: its axis may be tilted."""
-    return float(rotor.radius * math.sqrt(max(0.0, 1.0 - float(_shaft(rotor)[1]) ** 2)))
-
-
-def _shaft(rotor: Rotor) -> Any:
-    return rotor.shaft_direction / np.linalg.norm(rotor.shaft_direction)
-
-
 def scales(aircraft: Aircraft, scale_length: float | None = None) -> tuple[Scale, ...]:
     """Scales by which an aircraft is judged: by its lateral span, and by rotor radius where that is another one.
 
@@ -226,6 +208,6 @@ def scales(aircraft: Aircraft, scale_length: float | None = None) -> tuple[Scale
     if scale_length is not None:
         length = checks.number("scale_length", scale_length, *LENGTHS, "m", LinearizationError)
         return (Scale("length", length, known.span),)
-    span = Scale("lateral span", lateral_span(aircraft), known.span)
+    span = Scale("lateral span", aircraft.rotor_span, known.span)
     radius = Scale("rotor radius", max(rotor.radius for rotor in aircraft.rotors), known.radius)
     return (span,) if abs(span.speed_up / radius.speed_up - 1.0) < ALIKE else (span, radius)

@@ -15,7 +15,7 @@ from sbs_sim.aircraft.commands import row_problems
 from sbs_sim.aircraft.description import Drive
 from sbs_sim.flight.engine import Engine, points_engine
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
-from sbs_sim.flight.validity import warnings
+from sbs_sim.flight.validity import slow_rotors, warnings
 from sbs_sim.model import records as R
 from sbs_sim.model import state as S
 from sbs_sim.model.average import azimuths
@@ -42,7 +42,6 @@ BODY_BALANCES = (
 )
 DRIVE_BALANCES = {S.SPEED: "torque of a drive", S.ENGINE_TORQUE: "throttle", S.GOVERNOR: "speed of a governor"}
 DROOP = 1e-6  # share of the speed that a governor may lack
-MIN_SPEED = 0.2  # of a rotor's own below which it hardly turns: centrifugal force is 4 % of what it is then
 HALF = 0.5  # of torque and throttle: where trims begin
 
 
@@ -269,12 +268,11 @@ class TrimProblem:
         return (*lines, *unequal, *self._slow_rotors(x), *self._droops(x, swash))
 
     def _slow_rotors(self, x: Array) -> list[str]:
-        """Rotors with drives that hardly turn, so that centrifugal force does not hold their blades, a line each."""
+        """Rotors with drives that hardly turn, a line each."""
         found = []
-        for rotor, speed in zip(self.aircraft.rotors, self.aircraft.rotor_speeds(x).tolist(), strict=True):
-            if abs(speed) < MIN_SPEED * rotor.speed:
-                rpm, full = (value * RPM for value in (speed, rotor.speed))
-                found.append(f"{rotor.name}: turns at {rpm:.3g} of {full:.4g} rpm, too slowly to hold its blades")
+        for rotor, speed in slow_rotors(self.aircraft, self.aircraft.rotor_speeds(x)):
+            rpm, full = (value * RPM for value in (speed, rotor.speed))
+            found.append(f"{rotor.name}: turns at {rpm:.3g} of {full:.4g} rpm, too slowly to hold its blades")
         return found
 
     def _droops(self, x: Array, swash: Array) -> list[str]:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from sbs_sim.errors import SbsError
+from sbs_sim.output.warnings_text import joined
 from sbs_sim.terminal.command_line import Parser, assignment
 from sbs_sim.terminal.progress import show_compiling
 
@@ -236,8 +237,6 @@ def print_limits(point: "TrimPoint") -> None:
     """What a trim needs beyond its limits, and where the model does not hold."""
     for text in point.beyond_limits:
         print(f"beyond its limits: {text}")
-    from sbs_sim.output.warnings_text import joined
-
     for text in joined(point.warnings):
         print(f"{OUTSIDE}: {text}")
 

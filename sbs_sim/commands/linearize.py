@@ -190,10 +190,9 @@ def _print_exponents(craft: "Aircraft", point: "TrimPoint") -> None:
 
 def _azimuth_count(craft: "Aircraft", model: "LinearModel") -> int:
     """Instants of a period that the fastest mode needs: rotors of unequal speeds may have a long common period."""
-    from sbs_sim.analysis.periodic import common_period
+    from sbs_sim.analysis.periodic import flown_period
 
-    period = common_period(craft)[0] * craft.rotors[0].speed / float(model.trim.rotor_speed[0])
-    return _instants(period, model.poles)
+    return _instants(flown_period(craft, model.trim), model.poles)
 
 
 def _instants(period: float, poles: "NDArray[np.complex128]") -> int:

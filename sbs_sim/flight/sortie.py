@@ -87,7 +87,7 @@ class Sortie:
         air = Wind() if wind is None else wind
         checks.instance("wind", air, Wind, SimulationError)
         if balanced and air.is_local:
-            raise SimulationError("outputs: 'power_balance': allowed is air that is the same everywhere")
+            raise SimulationError(f"outputs: {POWER_BALANCE!r}: allowed is air that is the same everywhere")
         state: ArrayLike
         if isinstance(start, TrimPoint):
             ground = ground_of(aircraft, options.get("ground_altitude"))
@@ -99,10 +99,6 @@ class Sortie:
         self._pilot = (Mixed if actuators else Direct)(aircraft, pilot_command, initial)
         angles = self._pilot.angles(pilot_command(0, 0.0), 0.0)
         self.simulation = Simulation(aircraft, state, angles, wind=air, **options)
-        if balanced and self.simulation.space is not None:
-            raise SimulationError(
-                f"outputs: {POWER_BALANCE!r}: allowed is air that is the same at all rotors and parts"
-            )
         self.ticks = round(duration / self.simulation.tick)
         check_rows(controls, self.ticks, self.simulation.tick)
         self.failures = failures_by_tick(self.simulation, events)
@@ -146,18 +142,15 @@ class Sortie:
         working = np.concatenate(self._looks)
         lines = (*flight_warnings(aircraft, working), *self._pilot.warnings(self.simulation.tick))
         named = named_histories(aircraft, self._blocks, self.loaded)
-        return History(named | self._balance(), lines), self.fault
+        if self.balanced:
+            named |= self._balance(named["state"], named["swashplate"])
+        return History(named, lines), self.fault
 
-    def _balance(self) -> dict[str, Array]:
-        """Histories of the balance of power by name; none where it was not asked for."""
-        if not self.balanced:
-            return {}
-        simulation, blocks = self.simulation, [rows for rows, _ in self._blocks]
-        states, angles, steps, air = (
-            np.concatenate([getattr(rows, name) for rows in blocks]) for name in ("state", "swashplate", "step", "wind")
-        )
-        instants = states, angles, simulation.azimuths(steps), air
-        return named_balance(power_balance(simulation.engine, *instants))
+    def _balance(self, states: Array, swashplates: Array) -> dict[str, Array]:
+        """Histories of the balance of power by name."""
+        steps, air = (np.concatenate([getattr(rows, name) for rows, _ in self._blocks]) for name in ("step", "wind"))
+        instants = states, swashplates, self.simulation.azimuths(steps), air
+        return named_balance(power_balance(self.simulation.engine, *instants))
 
 
 def fly_together(sorties: Sequence[Sortie]) -> None:

@@ -40,6 +40,7 @@ RING_EDGEWISE = 0.95
 WINDMILL_DESCENT = 2.0
 # Heights of a hub above the ground, over the radius, below which the ground effect of a choice is not known.
 LEAST_HEIGHTS = {"cheeseman_bennett": LEAST_HEIGHT, "measured": 2.0 * float(CURVE[0, 0])}
+MIN_SPEED = 0.2  # of a rotor's own below which it hardly turns: centrifugal force is 4 % of what it is then
 MARGIN = 1e-9  # for rounding
 MIN_INFLOW = 0.002  # hover inflow ratio below which a rotor carries nothing, and has none of these states
 
@@ -187,6 +188,19 @@ def blade_warnings(rotor: Rotor) -> list[str]:
     if float(np.mean(share * (quarter - centre) / chord) / np.mean(share)) > MAX_TAIL_HEAVY:
         found.append(f"{rotor.name}: blades heavy behind the quarter chord, without flutter of elastic pitch")
     return found
+
+
+def slow_rotors(aircraft: Aircraft, speeds: Array) -> list[tuple[Rotor, float]]:
+    """Rotors that hardly turn, so that centrifugal force does not hold their blades, with their speeds [rad/s].
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    speeds : ndarray, shape (n_rotors,)
+        [rad/s]
+    """
+    pairs = zip(aircraft.rotors, speeds.tolist(), strict=True)
+    return [(rotor, speed) for rotor, speed in pairs if abs(speed) < MIN_SPEED * rotor.speed]
 
 
 def _known_numbers(aircraft: Aircraft, rotor: int) -> str:

@@ -18,7 +18,6 @@ from sbs_msgs.srv import EngineFailure, Reset, SetWind, Step
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.trim import trim
-from sbs_sim.analysis.trim_problem import MIN_SPEED
 from sbs_sim.errors import SbsError, SimulationError, TrimError
 from sbs_sim.flight.contact import state_on_ground
 from sbs_sim.flight.gust_file import read_gust
@@ -26,6 +25,7 @@ from sbs_sim.flight.gust_standards import specified_turbulence
 from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP_DEG, FREE_METHOD, METHOD, METHODS, Simulation
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import MAX_SPEED, standing_state, trimmed_state
+from sbs_sim.flight.validity import slow_rotors
 from sbs_sim.flight_loop import FlightLoop
 from sbs_sim.model.wind import MAX_WIND, RATES, Wind
 from sbs_sim.nodes.command_monitor import CommandMonitor
@@ -223,8 +223,7 @@ class Simulator(Component):
         point = trim(self.aircraft, airspeed, climb_rate, sideslip, turn_rate, **self._fidelity)
         if point.beyond_limits:
             raise TrimError("this flight needs " + "; ".join(point.beyond_limits))
-        pairs = zip(self.aircraft.rotors, point.rotor_speed.tolist(), strict=True)
-        if slow := [rotor.name for rotor, speed in pairs if abs(speed) < MIN_SPEED * rotor.speed]:
+        if slow := [rotor.name for rotor, _ in slow_rotors(self.aircraft, point.rotor_speed)]:
             raise TrimError(f"in this flight nothing turns {', '.join(slow)} fast enough to hold its blades")
         return point
 

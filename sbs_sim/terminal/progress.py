@@ -11,11 +11,11 @@ COMPILER = "sbs_sim.model.kernel"  # logger of what compiles
 
 def show_compiling() -> None:
     """Show on a terminal when kernels are compiled, for which a person else waits without a word."""
-    if sys.stderr is None or not sys.stderr.isatty():
+    logger = logging.getLogger(COMPILER)
+    if logger.handlers or sys.stderr is None or not sys.stderr.isatty():  # once in a process
         return
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(logging.Formatter("sbs_sim: %(message)s"))
-    logger = logging.getLogger(COMPILER)
     logger.addHandler(handler)
     logger.setLevel(logging.INFO)
 

@@ -14,7 +14,7 @@ from helpers import build
 from sbs_sim import Aircraft, linearize, qualities
 from sbs_sim.analysis.modes import Mode
 from sbs_sim.analysis.qualities import attitude_transfer, default_airspeeds
-from sbs_sim.analysis.quality_limits import Scale, lateral_span, limits, scales
+from sbs_sim.analysis.quality_limits import Scale, limits, scales
 from sbs_sim.analysis.step_response import first_order, first_peak, output_row, step_response, times
 from sbs_sim.errors import LinearizationError
 
@@ -42,7 +42,7 @@ def oscillation(growth, frequency):
 
 def test_scales_are_by_span_and_by_rotor(sbs, uh60a):
     """Froude: sqrt(16.36 / 2.3) and sqrt(8.178 / 0.505); at full size both are one."""
-    assert lateral_span(sbs) == pytest.approx(2.0 * (0.645 + 0.505))
+    assert sbs.rotor_span == pytest.approx(2.0 * (0.645 + 0.505))
     assert [scale.speed_up for scale in scales(sbs)] == pytest.approx([2.667, 4.024], abs=1e-3)
     assert [scale.speed_up for scale in scales(uh60a)] == pytest.approx([1.0], abs=1e-3)
     assert [scale.speed_up for scale in scales(sbs, 4.09)] == pytest.approx([2.0])
@@ -51,7 +51,7 @@ def test_scales_are_by_span_and_by_rotor(sbs, uh60a):
 
 def test_span_takes_rotors_as_they_stand(uh60a):
     """The tail rotor turns about y, but for its cant of 20 deg, and does not reach beyond the main rotor."""
-    assert lateral_span(uh60a) == pytest.approx(2.0 * uh60a.rotors[0].radius)
+    assert uh60a.rotor_span == pytest.approx(2.0 * uh60a.rotors[0].radius)
 
 
 def test_low_speed_ends_at_45_kt_of_full_size():

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from numba import config
 
+import sbs_sim
 from sbs_sim.model.kernel import target
 
 PACKAGE = Path(__file__).parent
@@ -21,7 +22,7 @@ SOURCES = ("model/*.py", "lanes/*.py")
 # Packages that could round otherwise in another version. numba and llvmlite translate: lanes are explicit instructions,
 # numbers beside them plain ones without fast math, so only other instructions for the same Python, or a fault, would
 # change a bit. numpy decides in which order its sums go.
-PACKAGES = ("sbs_sim", "numpy", "numba", "llvmlite")
+PACKAGES = ("numpy", "numba", "llvmlite")
 INTERPRETER = "interpreter"  # NUMBA_DISABLE_JIT: nothing is compiled
 
 
@@ -34,6 +35,7 @@ def versions() -> dict[str, str]:
         Packages by name, and "model_sources": a digest of what the model's sources say, without comments.
     """
     return {
+        "sbs_sim": sbs_sim.__version__,
         **{name: importlib.metadata.version(name) for name in PACKAGES},
         "model_sources": source_digest(path for pattern in SOURCES for path in PACKAGE.glob(pattern)),
     }

@@ -21,11 +21,12 @@ def config_folder() -> Path:
         The package was installed without them.
     """
     here = Path(__file__).resolve().parent
-    folders = [here.parent / "config", *(parent / "share/sbs_sim/config" for parent in here.parents)]
+    # of a wheel, of a checkout, of an installation of ROS
+    folders = [here / "config", here.parent / "config", *(parent / "share/sbs_sim/config" for parent in here.parents)]
     for folder in folders:
         if (folder / "aircraft").is_dir():
             return folder
-    raise AircraftError(f"no folder config/aircraft beside {here.parent} and none under share/sbs_sim above it")
+    raise AircraftError(f"no folder config/aircraft in or beside {here} and none under share/sbs_sim above it")
 
 
 def find_file(path_or_name: str | Path, kind: str, suffix: str, folder: Path) -> Path:

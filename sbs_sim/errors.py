@@ -33,6 +33,10 @@ class LinearizationError(SbsError):
     """A linear model that cannot be made."""
 
 
+class IdentificationError(SbsError):
+    """Frequency responses that cannot be identified, or an excitation for them that cannot be flown."""
+
+
 class RecordingError(SbsError):
     """A log that cannot be written or read."""
 
@@ -63,3 +67,7 @@ class ExportError(SbsError):
 
 class PilotError(SbsError):
     """A controller that cannot be designed, or a target or stick that it cannot take."""
+
+
+class ArduPilotError(SbsError):
+    """A packet of ArduPilot that is none, or a servo file that does not fit an aircraft."""

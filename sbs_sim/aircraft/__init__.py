@@ -23,7 +23,7 @@ from sbs_sim.aircraft.commands import Row, drive_offset, padded, rows_of, schedu
 from sbs_sim.aircraft.consistency import consistency_problems, table_problems
 from sbs_sim.aircraft.declaration import cached_by_class, declarations, frozen, schema_of, values_of
 from sbs_sim.aircraft.description import CONTACT, Array, Description, Range, Rotor
-from sbs_sim.aircraft.model_records import drive_of, first_rotor, gear, model_of, with_fidelity
+from sbs_sim.aircraft.model_records import drive_of, first_rotor, gear, model_of, with_fidelity, with_steady_sections
 from sbs_sim.aircraft.paths import (
     Location,
     check_path,
@@ -38,11 +38,11 @@ from sbs_sim.aircraft.paths import (
 )
 from sbs_sim.content import same
 from sbs_sim.errors import AircraftError
-from sbs_sim.model.airfoil import AirfoilTable, stall_angles
+from sbs_sim.model.airfoil import AirfoilTable, attached_lift, stall_angles
 from sbs_sim.model.frames import ONE, hub_axes
 from sbs_sim.model.mixing import mixed
 from sbs_sim.model.packing import by_blades, lane_count, side_by_side
-from sbs_sim.model.records import Model
+from sbs_sim.model.records import QUAD, Model
 from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, SPEED, SWASHPLATE_NAMES, StateLayout
 
 MAX_CHANGES_SHOWN = 5  # in a refusal
@@ -231,7 +231,20 @@ class Aircraft(Description):
             tuple(rotor.blades for rotor in self.rotors),
             tuple(drive.state_names for drive in self.drives),
             len(self.contact_points) if self.has_contact else 0,
+            tuple(rotor.has_wake_states for rotor in self.rotors),
+            self._separations if self.has_separation else 0,
         )
+
+    @property
+    def _separations(self) -> int:
+        """Sections of all blades, which have room in eights of two quads (`sbs_sim.model.records`)."""
+        quads = sum(-(-rotor.blades // QUAD) for rotor in self.rotors)
+        return -(-quads // 2) * 2 * QUAD * self.options.elements
+
+    @property
+    def has_separation(self) -> bool:
+        """Sections of a rotor have separation that follows the flow late."""
+        return any(rotor.has_late_separation for rotor in self.rotors)
 
     @property
     def has_contact(self) -> bool:
@@ -524,10 +537,15 @@ class Aircraft(Description):
         return with_fidelity(self._model, lead_lag, cyclic_inflow)
 
     def arranged(self, lead_lag: bool, cyclic_inflow: bool, lanes: str) -> Model:
-        """`model` with its blades in the lanes (lanes = "blades"), or copies of it ("points"); read only."""
+        """`model` with its blades in the lanes (lanes = "blades"), or copies of it ("points"); read only.
+
+        Points are those of trims and linear models, whose sections have the separation of the flow at the instant.
+        """
         key = lead_lag, cyclic_inflow, lanes
         if key not in self._arrangements:
             model, count = self.model(lead_lag, cyclic_inflow), lane_count()
+            if lanes == "points":
+                model = with_steady_sections(model)
             made = by_blades(model, count) if lanes == "blades" else side_by_side([model] * count)
             self._arrangements[key] = made
         return self._arrangements[key]
@@ -547,10 +565,11 @@ class Aircraft(Description):
 
     @cached_property
     def stall_table(self) -> Array:
-        """What `working_state` takes of every airfoil of every rotor, shape (n_rotors, airfoils, 5, n).
+        """What is known of the stall of every airfoil of every rotor, shape (n_rotors, airfoils, 7, n).
 
-        Reynolds or Mach numbers, the highest and lowest angle of attack [rad] at which the section is not stalled, and
-        the least and largest number for which the table holds; filled up with copies of the last.
+        Reynolds or Mach numbers, the highest and lowest angle of attack [rad] at which the section is not stalled, the
+        least and largest number for which the table holds, slope of the lift of attached flow [1/rad], and angle
+        without lift [rad]; filled up with copies of the last.
         """
         size = max(len(table.numbers) for tables in self.sections for table in tables)
         most = max(map(len, self.sections))
@@ -563,7 +582,8 @@ def _filled_up(tables: tuple[AirfoilTable, ...], count: int) -> tuple[AirfoilTab
 
 def _stall_rows(table: AirfoilTable, size: int) -> Array:
     count = len(table.numbers)
-    rows = (table.numbers, *stall_angles(table), *(np.full(count, end) for end in table.range))
+    ends = (np.full(count, end) for end in table.range)
+    rows = (table.numbers, *stall_angles(table), *ends, *attached_lift(table))
     return np.pad(rows, ((0, 0), (0, size - count)), "edge")
 
 

@@ -67,7 +67,8 @@ def _read_table(
         table = read_table(path, aspect_ratio)
         return replace(table, cd=table.cd + drag) if drag else table
     except AirfoilError as error:
-        raise AirfoilError(f"{key} = {name!r}: {error}") from None
+        other = "" if path.suffix == ".csv" else "; the command airfoil makes tables of C81, XFOIL and AeroDyn files"
+        raise AirfoilError(f"{key} = {name!r}: {error}{other}") from None
 
 
 def _covers_circle(path: Path) -> bool:

@@ -14,6 +14,7 @@ from sbs_sim.aircraft.part_consistency import part_problems
 from sbs_sim.model.airfoil import FINEST_DEG, MAX_HALF, NUMBER_NAMES, common_half
 from sbs_sim.model.descent import POWER_FACTOR
 from sbs_sim.model.state import CONTROL_NAMES, EULER_NAMES, SWASHPLATE_NAMES
+from sbs_sim.model.unsteady_airfoil import STATION
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
@@ -328,12 +329,21 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
             "1, with tip_loss_model = prandtl",
         ),
     ]
+    if rotor.has_wake_states:
+        limit = STATION * rotor.radius - rotor.hinge_offset
+        begin = f"< {limit:.6g}, {STATION:g} of the radius, with unsteady_airfoil = {rotor.unsteady_airfoil}"
+        relations += [
+            (rotor.blades > 2, "unsteady_airfoil", "steady, of a rotor with two blades"),
+            (rotor.root_cutout < limit, "root_cutout", begin),
+        ]
     if rotor.descent == "measured":
         factor = f"{POWER_FACTOR:g}, with descent = measured"
         relations += [
             (rotor.wake_expansion == 0.5 and rotor.duct_exit is None, "descent", "momentum, of a rotor with a duct"),
             (rotor.induced_power_factor == POWER_FACTOR, "induced_power_factor", factor),
         ]
+    else:
+        relations += [(rotor.ring_unsteadiness == 0.0, "ring_unsteadiness", "0, without descent = measured")]
     factors = rotor.lag_damping_factors
     relations += [
         (len(factors) == rotor.blades, "blade_lag_damping", f"a list of {rotor.blades}, one of each blade"),
@@ -375,6 +385,8 @@ def _offset_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
     if any(one.tip_loss_model != "factor" or one.profile_drag != "section" for one in aircraft.rotors):
         allowed = "allowed where a rotor of the aircraft has offsets of its blades are factor and section"
         problems.append(f"tip_loss_model, profile_drag: {allowed}")
+    if aircraft.has_separation:
+        problems.append("dynamic_stall: allowed where a rotor of the aircraft has offsets of its blades is none")
     if rotor.undersling and not rotor.is_teetering:
         problems.append(f"undersling = {rotor.undersling:g}: allowed is 0 where flap_hinge is not teetering")
     stations = np.unique(np.concatenate([[0.0, 1.0], *([] if rotor.quarter_stations is None else [_inner(rotor)])]))

@@ -45,6 +45,7 @@ from sbs_sim.model.state import (
     SPEED,
     SWASHPLATE_NAMES,
 )
+from sbs_sim.model.unsteady_airfoil import RATES, STATION
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
@@ -365,6 +366,11 @@ class Options:
         ("none", "skewed_wake"),
         default="none",
     )
+
+    @property
+    def meets_wakes(self) -> bool:
+        """True where rotors meet the wakes of one another."""
+        return self.interference != "none"
 
 
 def _mixing() -> Any:
@@ -704,6 +710,18 @@ class Rotor(ByContent):
         ("section", "oblique"),
         default="section",
     )
+    unsteady_airfoil: str = choice(
+        "steady: lift follows the flow at once; jones: circulation follows it by the indicial function of a thin"
+        " airfoil, of a rotor with three or more blades",
+        ("steady", "jones"),
+        default="steady",
+    )
+    dynamic_stall: str = choice(
+        "none: stall by the table at once; separation: the point of separation follows the flow late, in flights; trims"
+        " and linear models have the table",
+        ("none", "separation"),
+        default="none",
+    )
     swashplate_phase: float = number("Phase of the swashplate against the blades", -360, 360, "deg", symbol=r"\psi_s")
     airfoil: str = string("Airfoil table: a name in config/airfoils, or a path", is_physics=False)  # its table counts
     drag_increment: float = number(
@@ -790,6 +808,15 @@ class Rotor(ByContent):
         " measured, of an open rotor with an induced_power_factor of 1.1, which the measurement has in hover",
         ("momentum", "measured"),
         default="momentum",
+    )
+    ring_unsteadiness: float = number(
+        "Standard deviation of the thrust in the middle of the vortex ring over its mean, with descent = measured: a"
+        " seeded noise in flights in time; 0.2 is what was measured, 0 is the mean alone",
+        0,
+        0.5,
+        symbol="s_r",
+        model_field="ring_unsteadiness",
+        default=0.0,
     )
     collective_range: Range = interval("Range of the collective of the swashplate", -90, 90, "deg", is_physics=False)
     cyclic_range: Range = interval("Range of each cyclic of the swashplate", -90, 90, "deg", is_physics=False)
@@ -904,6 +931,23 @@ class Rotor(ByContent):
     def is_teetering(self) -> bool:
         """Its blades have one flap hinge."""
         return self.flap_hinge == "teetering"
+
+    @property
+    def has_wake_states(self) -> bool:
+        """Circulation of its blades follows the flow late."""
+        return self.unsteady_airfoil != "steady"
+
+    @property
+    def wake_rate(self) -> float:
+        """Rate at which the fast part of that circulation follows the flow in hover [1/s]."""
+        radius = STATION * self.radius
+        chord = float(self.chord_at((radius - self.hinge_offset) / self.blade_length))
+        return 2.0 * max(RATES) * radius * self.speed / chord if self.has_wake_states else 0.0
+
+    @property
+    def has_late_separation(self) -> bool:
+        """Separation on its sections follows the flow late."""
+        return self.dynamic_stall != "none"
 
     @property
     def lag_damping_factors(self) -> Array:

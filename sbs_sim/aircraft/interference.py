@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 CELLS = 24  # of the grid along each of the two components of the skew, from -1 to 1
 RIM_POINTS, SOURCE_POINTS = 48, 64  # on the rim of the disc that meets the wake, and on that of the one that sheds it
 RINGS, SPOKES = 4, 16  # inside
+NEAR = 1e-3  # R - r . e over R, below which their difference would lose digits
 CLOSEST = 1e-9  # radii: of a point to a filament, whose potential is a logarithm
 DIGITS = 12  # of geometries that are the same
 
@@ -95,12 +96,22 @@ def influence(pair: Pair, along: Array) -> Array:
     for row, own in zip(found, along, strict=True):
         hub, radius = _contracted(pair, own)
         between = (hub + radius * points)[:, None, :] - filaments
-        beyond = np.sqrt(np.einsum("ijk,ijk->ij", between, between)) - between @ own
+        beyond = _beyond(between, own)
         potential = np.log(np.maximum(beyond, CLOSEST)) @ lengths * (-0.5 / math.pi)
         rim = np.einsum("ij,ij->i", potential[:RIM_POINTS], steps[:, :2]) / radius
         mean = weights @ potential[RIM_POINTS:] / radius
         row[:] = rim.sum(), 4.0 * (cosine @ rim - right[:2] @ mean), 4.0 * (sine @ rim + ahead[:2] @ mean)
     return found
+
+
+def _beyond(between: Array, along: Array) -> Array:
+    """R - r . e of vectors r, shape (..., 3); where these are nearly equal, down the wake, |r x e|^2 / (R + r . e)."""
+    behind, length = between @ along, np.sqrt(np.einsum("ijk,ijk->ij", between, between))
+    beyond: Array = length - behind
+    near = beyond < NEAR * length
+    across = between[near] - behind[near, np.newaxis] * along
+    beyond[near] = np.einsum("ij,ij->i", across, across) / (length[near] + behind[near])
+    return beyond
 
 
 def _disc() -> tuple[Array, Array]:
@@ -117,9 +128,11 @@ def _contracted(pair: Pair, along: Array) -> tuple[Array, float]:
     if depth <= 0.0:
         return hub, pair.radius
     far = abs(pair.hub[2])
-    area = 1.0 + along[2] * along[2] * (1.0 / pair.expansion - 1.0) * far / math.hypot(1.0, far)
-    widening, centre = math.sqrt(area), along * (pair.hub[2] / along[2])
-    return centre + (hub - centre) * widening, pair.radius * widening
+    growth = (1.0 / pair.expansion - 1.0) * far / math.hypot(1.0, far)
+    widening = math.sqrt(1.0 + along[2] * along[2] * growth)
+    # from the axis of the wake at that depth, which is far away where the wake is nearly level: without dividing by it
+    outward = along[2] * hub - pair.hub[2] * along
+    return hub + outward * (along[2] * growth / (1.0 + widening)), pair.radius * widening
 
 
 # -- tables ------------------------------------------------------------------------------------------------
@@ -132,7 +145,7 @@ def node_values(pair: Pair) -> Array:
     Mirrored geometries have mirrored values, to the last bit.
     """
     for axis in (1, 0):
-        if pair.hub[axis] < 0.0:
+        if _mirror(pair, axis) > pair:
             return _mirrored(node_values(_mirror(pair, axis)), axis)
     grid = np.linspace(-1.0, 1.0, CELLS + 1)
     x, y = (values.ravel() for values in np.meshgrid(grid, grid, indexing="ij"))
@@ -183,7 +196,7 @@ def _rows(pair: Pair) -> Array:
 
 def records_of(aircraft: "Aircraft") -> tuple[NDArray[Any], Array]:
     """Records of all pairs of rotors, and their tables one behind the other; none without interference."""
-    rotors: Sequence[Rotor] = aircraft.rotors if aircraft.options.interference != "none" else ()
+    rotors: Sequence[Rotor] = aircraft.rotors if aircraft.options.meets_wakes else ()
     numbers = [(i, j) for i in range(len(rotors)) for j in range(len(rotors)) if i != j]
     pairs, tables, first = R.records(R.PAIR, len(numbers), 1), dict[Pair, tuple[int, Array]](), 0
     for record, (target, source) in zip(pairs, numbers, strict=True):

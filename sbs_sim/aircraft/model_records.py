@@ -13,11 +13,23 @@ from sbs_sim.aircraft.description import ENGINES, GROUND_EFFECTS, Body, Drive, R
 from sbs_sim.aircraft.interference import records_of
 from sbs_sim.aircraft.surfaces import Parts, parts_of, slope_changes
 from sbs_sim.model import records as R
-from sbs_sim.model.airfoil import DEGREE, AirfoilTable, Grid, cell_grid, cells, common_grid
+from sbs_sim.model.airfoil import DEGREE, AirfoilTable, Grid, cell_grid, cells, common_grid, interpolate
 from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import hub_axes
+from sbs_sim.model.section_options import NO_TIP_LOSS, TIP_LOSS
+from sbs_sim.model.separation import LAG
 from sbs_sim.model.solve import length
-from sbs_sim.model.state import ENGINE_TORQUE, GOVERNOR, ROW, SPEED, SWASHPLATE_NAMES, UNSEEN_NAMES, harmonic_count
+from sbs_sim.model.state import (
+    ENGINE_TORQUE,
+    GOVERNOR,
+    ROW,
+    SPEED,
+    SWASHPLATE_NAMES,
+    UNSEEN_NAMES,
+    WAKE_NAMES,
+    harmonic_count,
+)
+from sbs_sim.model.unsteady_airfoil import RATES, SHARES, STATION
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
@@ -25,7 +37,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 SECONDS_PER_HOUR = 3600.0
 NO_GROUND = 1e9  # m, depth of the ground where there is none
+REACH = 1.5  # times the distance of the farthest point of contact, so that attitudes within a step may lack unit length
 NO_STOP = 1e6  # rad
+ATTACHED = math.radians(5.0)  # to either side of which the slope of the lift is that of attached flow
 MIN_DENSITY = 1e-12  # kg/m^3, less than at 300 km: below it is vacuum
 
 
@@ -44,6 +58,9 @@ def model_of(aircraft: "Aircraft") -> R.Model:
             _set(blades[number], _blade_values(aircraft, rotor, k, grids[j]))
             blades[number]["quad"], blades[number]["starts_quad"] = quads[j] + k // R.QUAD, k % R.QUAD == 0
             blades[number]["elements"], blades[number]["harmonics"] = j, harmonic_count(rotor.blades)
+            octet, lane = divmod(R.QUAD * int(quads[j]) + k, 2 * R.QUAD)
+            blades[number]["separation_first"] = octet * aircraft.options.elements * 2 * R.QUAD + lane
+            blades[number]["separation_stride"] = 2 * R.QUAD
             inner = grids[j].knots[1:-1]
             knots[number, :, 0] = np.concatenate([inner, np.full(most - len(inner), np.inf)])
             number += 1
@@ -119,6 +136,7 @@ def ground_record(aircraft: "Aircraft", altitude: float | None) -> NDArray[Any]:
         "first": up_slope,
         "second": np.array([-heading[1], heading[0], 0.0]),
         "depth": NO_GROUND if altitude is None or altitude == -math.inf else -altitude * slope[0],
+        "reach": REACH * max((length(point.position) for point in aircraft.contact_points), default=0.0),
     }
     _set(record[0], values)
     return record
@@ -165,6 +183,13 @@ def with_fidelity(model: R.Model, lead_lag: bool, cyclic_inflow: bool) -> R.Mode
     return model._replace(switches=switches, blades=blades, indices=indices)
 
 
+def with_steady_sections(model: R.Model) -> R.Model:
+    """Model whose sections have the separation of the flow at the instant: for trims and linear models."""
+    switches = model.switches.copy()
+    switches["late_stall"] = 0
+    return model._replace(switches=switches)
+
+
 def _set(record: Any, values: dict[str, Any]) -> None:
     """Set fields of a record with a single lane."""
     for name, value in values.items():
@@ -179,17 +204,21 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["lag_stops"] = any(rotor.lag_stops is not None for rotor in aircraft.rotors)
     switches["offsets"] = any(rotor.has_offsets for rotor in aircraft.rotors)
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
-    switches["section_options"] = any(
-        rotor.tip_loss_model == "prandtl" or rotor.profile_drag == "oblique" for rotor in aircraft.rotors
-    )
+    if any(rotor.tip_loss_model == "prandtl" for rotor in aircraft.rotors):
+        switches["section_options"] = TIP_LOSS
+    elif aircraft.has_separation or any(rotor.profile_drag == "oblique" for rotor in aircraft.rotors):
+        switches["section_options"] = NO_TIP_LOSS
     switches["stand"] = aircraft.body.is_stand
     switches["scheduled"] = any(rotor.schedule for rotor in aircraft.rotors)
+    switches["has_separation"] = switches["late_stall"] = aircraft.has_separation
+    switches["unsteady_airfoil"] = any(rotor.has_wake_states for rotor in aircraft.rotors)
     switches["ducts"] = any(rotor.duct_exit is not None for rotor in aircraft.rotors)
     switches["contact"] = aircraft.has_contact
     switches["ground_effect"] = GROUND_EFFECTS.index(aircraft.ground.effect)
     switches["teetering"] = any(rotor.is_teetering for rotor in aircraft.rotors)
-    switches["interference"] = aircraft.options.interference != "none"
-    switches["wash"] = (switches["ground_effect"] > 0) | (switches["interference"] > 0)
+    switches["interference"] = aircraft.options.meets_wakes
+    switches["ring"] = any(rotor.ring_unsteadiness > 0.0 for rotor in aircraft.rotors)
+    switches["wash"] = (switches["ground_effect"] > 0) | (switches["interference"] > 0) | (switches["ring"] > 0)
     return switches
 
 
@@ -256,12 +285,36 @@ def _blade_values(aircraft: "Aircraft", rotor: Rotor, number: int, grid: Grid) -
         "lead_lag": 1.0,
         "tip_blades": rotor.blades if rotor.tip_loss_model == "prandtl" else 0,
         "element_width": (rotor.blade_length - rotor.root_cutout) / aircraft.options.elements / rotor.radius,
+        "late_stall": rotor.has_late_separation,
         "oblique_drag": rotor.profile_drag == "oblique",
+        **_wake_values(aircraft, rotor),
         "first_alpha": first_angle,
         "inverse_alpha_step": inverse_step,
         "alpha_cells": columns,
         "min_number": grid.range[0],
         "max_number": grid.range[1],
+    }
+
+
+def _wake_values(aircraft: "Aircraft", rotor: Rotor) -> dict[str, float]:
+    """Values of the section whose circulation follows the flow (theory.md section 4.9)."""
+    if not rotor.has_wake_states:
+        return {}
+    span = STATION * rotor.radius - rotor.hinge_offset
+    share = span / rotor.blade_length
+    table = aircraft.table_at(aircraft.rotors.index(rotor), STATION)
+    by_chord = 2.0 / float(rotor.chord_at(share))
+    return {
+        "wake_span": span,
+        "wake_pitch": float(rotor.twist_at(share)) - table.zero_lift_angle,
+        "inverse_wake_radius": 1.0 / (STATION * rotor.radius),
+        "tip_speed": rotor.speed * rotor.radius,
+        "inverse_wake_speed": 1.0 / (rotor.speed * rotor.radius),
+        "inverse_sound_speed": 1.0 / aircraft.environment.speed_of_sound,
+        "wake_slow_share": SHARES[0],
+        "wake_fast_share": SHARES[1],
+        "wake_slow_rate": by_chord * RATES[0],
+        "wake_fast_rate": by_chord * RATES[1],
     }
 
 
@@ -310,6 +363,7 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
             "duct_turning": _turning(rotor),
             "inverse_lip_stall": 0.0 if rotor.lip_stall is None else 1.0 / rotor.lip_stall,
             "momentum_scale": math.pi * (rotor.radius * rotor.radius) * (tip_speed * tip_speed),
+            "ring_gain": ring_gain(aircraft, j) if rotor.ring_unsteadiness > 0.0 else 0.0,
         }
         _set(rotors[j], values)
         integers = {
@@ -325,11 +379,25 @@ def _rotors(aircraft: "Aircraft", quads: NDArray[np.int64]) -> NDArray[Any]:
             "lag": layout.lag(j).start,
             "lag_rate": layout.lag_rate(j).start,
             "inflow": layout.inflow(j).start,
+            "wake": layout.wake(j).start if rotor.has_wake_states else -1,
             "drive": drive_of(aircraft, rotor),
         }
         for name, value in integers.items():
             rotors[j][name] = value
     return rotors
+
+
+def ring_gain(aircraft: "Aircraft", number: int) -> float:
+    """Uniform inflow that lowers the thrust coefficient of a rotor by one, over kappa_i, eq. (6.24)."""
+    rotor, table = aircraft.rotors[number], aircraft.sections[number][-1]
+    span, chord, half_area, lift_factor, _ = rotor.elements(aircraft.options.elements)
+    radius = rotor.hinge_offset + span
+    numbers = number_scale(aircraft, number, chord) * (rotor.speed * radius)
+    lift, _ = interpolate(table, numbers, np.full(len(span), ATTACHED), aircraft.options.interpolation)
+    other, _ = interpolate(table, numbers, np.full(len(span), -ATTACHED), aircraft.options.interpolation)
+    slope = (lift - other) / (2.0 * ATTACHED)
+    response = rotor.blades * float((half_area * radius * slope * lift_factor).sum()) / (math.pi * rotor.radius**3)
+    return 1.0 / (response * rotor.induced_power_factor)
 
 
 def drive_of(aircraft: "Aircraft", rotor: Rotor) -> int:
@@ -400,10 +468,15 @@ def _state_indices(aircraft: "Aircraft", quads: NDArray[np.int64]) -> R.StateInd
     first = {
         name: [getattr(layout, name)(j).start for j in number] for name in ("flap", "flap_rate", "lag", "lag_rate")
     }
+    for k, name in enumerate(WAKE_NAMES):
+        wakes = [(layout.wake(j).start, layout.blades[j], aircraft.rotors[j].has_wake_states) for j in number]
+        first[name] = [start + k * blades if has_wake else -1 for start, blades, has_wake in wakes]
     found = {}
     for name, starts in first.items():
         places = np.full((2 * harmonics + 2, len(number)), zero, dtype=np.int64)
         for quad, (start, j) in enumerate(zip(starts, number, strict=True)):
+            if start < 0:
+                continue
             blades = aircraft.rotors[j].blades
             turning = 1 + 2 * harmonic_count(blades)
             places[:turning, quad] = start + np.arange(turning)
@@ -430,6 +503,8 @@ def _elements(aircraft: "Aircraft", first_rows: list[list[int]]) -> NDArray[Any]
         airfoil = rotor.airfoil_at(elements["span"][j])
         elements["airfoil"][j], elements["first_row"][j] = airfoil, np.array(first_rows[j])[airfoil]
         elements["cos_sweep"][j] = 1.0
+        if rotor.has_late_separation:
+            elements["separation_rate"][j] = 1.0 / (LAG * elements["chord"][j])
         if rotor.has_offsets:
             _set_offsets(aircraft, j, elements[j])
     return elements

@@ -70,7 +70,16 @@ from sbs_sim.lanes.interpreted import (
     with_sign,
     zeros_like,
 )
-from sbs_sim.lanes.memory import add_record, add_to_quads, as_lanes, as_records, copy_record, spread, table_row
+from sbs_sim.lanes.memory import (
+    add_record,
+    add_to_quads,
+    as_lanes,
+    as_quads,
+    as_records,
+    copy_record,
+    spread,
+    table_row,
+)
 
 __all__ = [
     "ZERO",
@@ -84,6 +93,7 @@ __all__ = [
     "all_lanes",
     "any_lane",
     "as_lanes",
+    "as_quads",
     "as_records",
     "copy_record",
     "cross",

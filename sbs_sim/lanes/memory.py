@@ -2,7 +2,8 @@
 
 An array of shape (..., n) is an array of shape (...) of lanes. A structured array whose fields have shapes (n,), (3,
 n), (3, 3, n) or (m, n) is an array of records of lanes, vectors, matrices, or m lanes; fields of integers stay
-integers. Nothing is copied: writing changes the numpy array.
+integers. Nothing is copied: writing changes the numpy array. `as_quads` makes four lanes of a last axis of four
+numbers, whatever the lanes of the rest are.
 
 Quads of blades
 ---------------
@@ -312,6 +313,16 @@ def _as_lanes(typingctx: Any, array: Any, like: Any) -> Any:
     return wanted(array, like), codegen
 
 
+@intrinsic
+def _as_quads(typingctx: Any, array: Any) -> Any:
+    wanted = types.Array(LanesType(QUAD), array.ndim - 1, "C", aligned=False)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _view(context, builder, array, args[0], wanted, 8 * QUAD)
+
+    return wanted(array), codegen
+
+
 def _lanes_of(like: Any) -> int:
     """Number of lanes of an array of lanes or records, of a record, or of lanes."""
     return int(like.dtype.n if isinstance(like, types.Array) else like.n)
@@ -548,6 +559,10 @@ def _plain_as_lanes(array: Any, like: Any) -> Any:
     return LanesArray(array)
 
 
+def _plain_as_quads(array: Any) -> Any:
+    return LanesArray(array)
+
+
 def _width(like: Any) -> int:
     """Number of lanes of an array of lanes or records, of a record, or of lanes."""
     if isinstance(like, Lanes):
@@ -603,9 +618,11 @@ def _plain_table_row(table: Any, row: Any, x: Any, degree: int) -> tuple[Lanes, 
 
 if config.DISABLE_JIT:
     as_records, as_lanes, spread = _plain_as_records, _plain_as_lanes, _plain_spread
+    as_quads = _plain_as_quads
     add_to_quads, table_row = _plain_add_to_quads, _plain_table_row
     copy_record, add_record = _plain_copy_record, _plain_add_record
 else:
     as_records, as_lanes, spread = _as_records, _as_lanes, _spread
+    as_quads = _as_quads
     add_to_quads, table_row = _add_to_quads, _table_row
     copy_record, add_record = _copy_record, _add_record

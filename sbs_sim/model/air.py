@@ -11,14 +11,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.lanes import Vector, as_lanes, as_records, transposed
+from sbs_sim.lanes import Vector, as_lanes, as_quads, as_records, transposed, zeros_like
 from sbs_sim.model import state as S
-from sbs_sim.model.air_field import sampled
+from sbs_sim.model.air_elements import pose_of, set_blades, set_element_sites, turn_elements
+from sbs_sim.model.air_field import WEIGHTS, sampled, sampled_value
 from sbs_sim.model.air_rows import ALONG_X, ALONG_Y, CG_ROWS, PART_ROWS
 from sbs_sim.model.frames import rotation
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.real_functions import cosine_of_turn, logarithm, power_of, sine_of_turn
-from sbs_sim.model.records import GUST_ROWS, Model, Space, aligned
+from sbs_sim.model.records import GUST_ROWS, Model, Space, aligned, no_space, state_size
 from sbs_sim.model.state import attitude_at
 from sbs_sim.model.wind_columns import RATES_FROM, RATES_TO
 
@@ -33,16 +34,19 @@ PROFILE, GROUND, REFERENCE_HEIGHT, SHAPE = 9, 10, 11, 12  # kind, heights [m], r
 FRONT, PEAK, LENGTH = 13, 14, 17  # shape of the gust, velocity NED [m/s], length [m]
 COSINE, SINE, ORIGIN, DISTANCE = 18, 19, 20, 22  # of the direction of flight through it; north, east, ahead [m]
 FIRST_ROW, ROWS = 23, 24  # of the own gust over distance
-SPACE_SIZE = 25
+ELEMENTS = 25  # 1 where the air is sampled at every blade element
+SPACE_SIZE = 26
 
 UNIFORM, LOGARITHMIC, POWER = range(3)  # profiles
 NO_FRONT, ONE_MINUS_COSINE, RAMP = range(3)  # shapes of gusts over distance
+AT_POINT, BY_NORTH, BY_EAST, BY_DOWN = range(4)  # velocity at a point, and its derivatives
+FOUND = 4
 SITE_ROWS, PART_SITE_ROWS = 9, 3  # offset, and the hub's x and y axis; offset
 
 
 def make_space(parameters: Array, grids: Array, table: Array) -> Space:
     """Air of one flight; memory comes with `joined_spaces`."""
-    return Space(parameters[:, np.newaxis], grids, table, np.zeros((0, 1)))
+    return no_space(1)._replace(parameters=parameters[:, np.newaxis], grids=grids, tables=table)
 
 
 def joined_spaces(model: Model, spaces: Sequence[Space], n: int) -> Space:
@@ -59,24 +63,33 @@ def joined_spaces(model: Model, spaces: Sequence[Space], n: int) -> Space:
             parameters[name, lane] = sum(len(part) for part in before)
             if not any(known):
                 kept.append(own)
-    parts = len(model.surfaces) + len(model.fuselages)
-    sites = aligned((SITE_ROWS * len(model.rotors) + PART_SITE_ROWS * parts, n), float)
+    parts, elements = len(model.surfaces) + len(model.fuselages), (0, 0)
+    if any(space.parameters[ELEMENTS, 0] for space in spaces):
+        elements = len(model.blades), model.elements.shape[1]
+    mass = model.blades["mass"]
+    flights = np.where(mass > 0.0, np.minimum(np.arange(mass.shape[-1]), n - 1), -1).reshape(-1, mass.shape[-1])
+    sites = aligned((SITE_ROWS * len(model.rotors) + PART_SITE_ROWS * (parts + 2), n), float)
     return Space(
         parameters,
         grids[0] if len(grids) == 1 else np.concatenate(grids),
         tables[0] if len(tables) == 1 else np.concatenate(tables),
         sites,
+        aligned((FOUND + WEIGHTS, 4), float),
+        aligned((*elements, 3, mass.shape[-1]), float),
+        flights.astype(np.int64),
+        aligned((state_size(model) + 1, n), float),
+        aligned((len(model.rotors), n), float),
     )
 
 
 @entry
-def air_in_space(model, x, wind, time, space, out):
+def air_in_space(model, x, psi, wind, time, space, out):
     """`add_air` for one instant at the beginning of a tick."""
-    add_air(model, x, wind, time, 0.0, space, out)
+    add_air(model, x, psi, wind, time, 0.0, space, out)
 
 
 @kernel
-def add_air(model, x, wind, time, fraction, space, out):
+def add_air(model, x, psi, wind, time, fraction, space, out):
     """Add to the velocity of the air at the c.g. what belongs to its position, and set what differs elsewhere.
 
     Parameters
@@ -84,6 +97,8 @@ def add_air(model, x, wind, time, fraction, space, out):
     model : Model
     x : ndarray, shape (size, n)
         Simulation states.
+    psi : ndarray, shape (n_rotors, n)
+        Azimuths of the rotors, see `sbs_sim.model.dynamics.derivative` [rad].
     wind : ndarray, shape (WIND_SIZE, n)
         Air of the tick.
     time, fraction : float
@@ -97,6 +112,38 @@ def add_air(model, x, wind, time, fraction, space, out):
     for lane in range(out.shape[1]):
         add_air_of_flight(rotors.shape[0], parts, x, wind, time, fraction, space, lane, out)
     turn_rows(model, x, out)
+    if space.elements.shape[0] > 0:
+        set_elements(model, x, psi, time, space, out)
+
+
+@kernel
+def set_elements(model, x, psi, time, space, out):
+    """Set the air at every blade element."""
+    set_blades(model, x, psi, space)
+    for r in range(space.elements.shape[0]):
+        basis = pose_of(model, space, r)
+        set_element_sites(model, space, r, basis)
+        for i in range(space.elements.shape[1]):
+            for lane in range(space.elements.shape[3]):
+                sample_element(x, time, space, space.elements[r, i], lane, space.flights[r, lane])
+        turn_elements(model, space, out, r, basis)
+
+
+@kernel
+def sample_element(x, time, space, element, lane, flight):
+    """Put the velocity of the air of a flight at an element, less that at the c.g., where its position was.
+
+    What fills up a quad, which has no flight, gets that of its neighbour.
+    """
+    if flight < 0:
+        for k in range(3):
+            element[k, lane] = element[k, lane - 1]
+        return
+    found, last = space.found, space.sites.shape[0] - 3
+    north, east = x[0, flight] + element[0, lane], x[1, flight] + element[1, lane]
+    set_local_air(space, flight, time, north, east, x[2, flight] + element[2, lane], False)
+    for k in range(3):
+        element[k, lane] = found[AT_POINT, k] - space.sites[last + k, flight]
 
 
 @kernel
@@ -136,33 +183,49 @@ def turn_rows(model, x, out):
 @kernel
 def add_air_of_flight(rotors, parts, x, wind, time, fraction, space, lane, out):
     """`add_air` of one flight, in earth axes."""
-    sites, north, east, down = space.sites, x[0, lane], x[1, lane], x[2, lane]
+    sites, found, north, east, down = space.sites, space.found, x[0, lane], x[1, lane], x[2, lane]
     p = between(wind, RATES_FROM, RATES_TO, fraction, lane)
     q = between(wind, RATES_FROM + 1, RATES_TO + 1, fraction, lane)
     r = between(wind, RATES_FROM + 2, RATES_TO + 2, fraction, lane)
-    here = local_air(space, lane, time, north, east, down)
+    for point in range(rotors + parts + 1):  # of which the last is the c.g.
+        is_hub = point < rotors
+        site, row = site_of(point, rotors), CG_ROWS + row_of(point, rotors)
+        a, b, c = sites[site, lane], sites[site + 1, lane], sites[site + 2, lane]
+        set_local_air(space, lane, time, north + a, east + b, down + c, is_hub)
+        if point == rotors + parts:
+            break
+        turning = cross_product(p, q, r, a, b, c)
+        for i in range(3):
+            out[row + i, lane] = found[AT_POINT, i] + turning[i]
+        if is_hub:
+            for first in range(ALONG_X, ALONG_Y + 1, ALONG_Y - ALONG_X):
+                a, b, c = sites[site + first, lane], sites[site + first + 1, lane], sites[site + first + 2, lane]
+                turning = cross_product(p, q, r, a, b, c)
+                for i in range(3):
+                    slope = found[BY_NORTH, i] * a + found[BY_EAST, i] * b
+                    out[row + first + i, lane] = (slope + found[BY_DOWN, i] * c) + turning[i]
+    last = sites.shape[0] - 3
     for i in range(3):
-        out[i, lane] += here[i]
-    for j in range(rotors):
-        site, row = SITE_ROWS * j, CG_ROWS + GUST_ROWS * j
-        a, b, c = sites[site, lane], sites[site + 1, lane], sites[site + 2, lane]
-        there = local_air(space, lane, time, north + a, east + b, down + c)
-        turning = cross_product(p, q, r, a, b, c)
+        out[i, lane] += found[AT_POINT, i]
+        sites[last + i, lane] = found[AT_POINT, i]
+    for point in range(rotors + parts):
+        row = CG_ROWS + row_of(point, rotors)
         for i in range(3):
-            out[row + i, lane] = (there[i] - here[i]) + turning[i]
-        for first in (ALONG_X, ALONG_Y):
-            a, b, c = sites[site + first, lane], sites[site + first + 1, lane], sites[site + first + 2, lane]
-            turning = cross_product(p, q, r, a, b, c)
-            for i in range(3):
-                slope = (there[3 + i] * a + there[6 + i] * b) + there[9 + i] * c
-                out[row + first + i, lane] = slope + turning[i]
-    for k in range(parts):
-        site, row = SITE_ROWS * rotors + PART_SITE_ROWS * k, CG_ROWS + GUST_ROWS * rotors + PART_ROWS * k
-        a, b, c = sites[site, lane], sites[site + 1, lane], sites[site + 2, lane]
-        there = local_air(space, lane, time, north + a, east + b, down + c)
-        turning = cross_product(p, q, r, a, b, c)
-        for i in range(3):
-            out[row + i, lane] = (there[i] - here[i]) + turning[i]
+            out[row + i, lane] -= found[AT_POINT, i]
+
+
+@kernel
+def site_of(point, rotors):
+    """First row of `Space.sites` of a rotor, a part, or behind them the c.g."""
+    hubs = min(point, rotors)
+    return SITE_ROWS * hubs + PART_SITE_ROWS * (point - hubs)
+
+
+@kernel
+def row_of(point, rotors):
+    """First row of the air of a rotor or part, behind those of the c.g."""
+    hubs = min(point, rotors)
+    return GUST_ROWS * hubs + PART_ROWS * (point - hubs)
 
 
 @kernel
@@ -178,55 +241,64 @@ def cross_product(p, q, r, a, b, c):
 
 
 @kernel
-def local_air(space, lane, time, north, east, down):
-    """Velocity of the air at a position that its tick does not have yet, and its derivatives.
+def set_local_air(space, lane, time, north, east, down, sloped):
+    """Set velocity and derivatives of the air at a position that its tick does not have yet, in `space.found`.
 
-    Returns
-    -------
-    tuple of 12 floats
-        Velocity NED [m/s], and its derivatives to the north, to the east and downwards, NED each [1/s].
+    Velocity NED [m/s], and its derivatives to the north, to the east and downwards, NED each [1/s]; without meaning
+    where they are not asked for, by `sloped`.
     """
-    parameters = space.parameters
+    parameters, found = space.parameters, space.found
     age = time - parameters[START, lane]
     x = north - parameters[DRIFT, lane] * age
     y = east - parameters[DRIFT + 1, lane] * age
-    field = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    rows = as_quads(found)
+    for k in range(FOUND):
+        rows[k] = zeros_like(rows[k])
     if parameters[GRIDS, lane] > 0.0:
-        field = sampled(space.grids, int(parameters[FIRST_GRID, lane]), int(parameters[GRIDS, lane]),
-                        parameters[PERIOD, lane], x, y)  # fmt: skip
-    h, v = parameters[HORIZONTAL, lane], parameters[VERTICAL, lane]
-    share, growth = share_of_height(parameters, lane, down)
-    ahead = (x - parameters[ORIGIN, lane]) * parameters[COSINE, lane]
-    ahead += (y - parameters[ORIGIN + 1, lane]) * parameters[SINE, lane]
-    ahead -= parameters[DISTANCE, lane]
-    front, steepness = front_share(parameters, lane, ahead)
-    own = own_gust(space.tables, int(parameters[FIRST_ROW, lane]), int(parameters[ROWS, lane]), ahead)
-    w_n, s_n = total_gust(parameters, lane, 0, front, steepness, own[0], own[3])
-    w_e, s_e = total_gust(parameters, lane, 1, front, steepness, own[1], own[4])
-    w_d, s_d = total_gust(parameters, lane, 2, front, steepness, own[2], own[5])
-    c, s = parameters[COSINE, lane], parameters[SINE, lane]
-    u_n, u_e, u_d = parameters[DRIFT, lane], parameters[DRIFT + 1, lane], parameters[DRIFT + 2, lane]
-    return (
-        h * field[0] + w_n + share * u_n,
-        h * field[1] + w_e + share * u_e,
-        v * field[2] + w_d + share * u_d,
-        h * field[3] + c * s_n,
-        h * field[4] + c * s_e,
-        v * field[5] + c * s_d,
-        h * field[6] + s * s_n,
-        h * field[7] + s * s_e,
-        v * field[8] + s * s_d,
-        growth * u_n,
-        growth * u_e,
-        growth * u_d,
-    )
+        set_field(space, lane, x, y, sloped)
+    if parameters[PROFILE, lane] != UNIFORM:
+        share, growth = share_of_height(parameters, lane, down)
+        for i in range(3):
+            found[AT_POINT, i] += share * parameters[DRIFT + i, lane]
+            found[BY_DOWN, i] = growth * parameters[DRIFT + i, lane]
+    if parameters[FRONT, lane] != NO_FRONT or parameters[ROWS, lane] > 0.0:
+        add_gusts(space, lane, x, y)
 
 
 @kernel
-def total_gust(parameters, lane, axis, front, steepness, own, own_slope):
-    """Velocity of gusts over distance along an axis, and its slope."""
-    peak = parameters[PEAK + axis, lane]
-    return front * peak + own, steepness * peak + own_slope
+def set_field(space, lane, x, y, sloped):
+    """Set what turbulence makes of the air at a place in the field [m], and its derivatives if they are asked for."""
+    parameters, found, grids = space.parameters, space.found, as_quads(space.grids)
+    rows, memory = as_quads(found), found[FOUND:]
+    begin, levels, period = int(parameters[FIRST_GRID, lane]), int(parameters[GRIDS, lane]), parameters[PERIOD, lane]
+    count = 1
+    if sloped:
+        count = BY_DOWN
+        rows[AT_POINT], rows[BY_NORTH], rows[BY_EAST] = sampled(grids, begin, levels, period, x, y, memory)
+    else:
+        rows[AT_POINT] = sampled_value(grids, begin, levels, period, x, y, memory)
+    h, v = parameters[HORIZONTAL, lane], parameters[VERTICAL, lane]
+    for k in range(count):
+        found[k, 0] *= h
+        found[k, 1] *= h
+        found[k, 2] *= v
+
+
+@kernel
+def add_gusts(space, lane, x, y):
+    """Add the gusts over distance at a place in the air [m]."""
+    parameters, found = space.parameters, space.found
+    c, s = parameters[COSINE, lane], parameters[SINE, lane]
+    ahead = (x - parameters[ORIGIN, lane]) * c + (y - parameters[ORIGIN + 1, lane]) * s
+    ahead -= parameters[DISTANCE, lane]
+    front, steepness = front_share(parameters, lane, ahead)
+    own = own_gust(space.tables, int(parameters[FIRST_ROW, lane]), int(parameters[ROWS, lane]), ahead)
+    for i in range(3):
+        peak = parameters[PEAK + i, lane]
+        slope = steepness * peak + own[3 + i]
+        found[AT_POINT, i] += front * peak + own[i]
+        found[BY_NORTH, i] += c * slope
+        found[BY_EAST, i] += s * slope
 
 
 @kernel

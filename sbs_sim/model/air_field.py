@@ -16,18 +16,44 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.lanes import as_quads, floor, rounded, zeros_like
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.noise import normal
 from sbs_sim.model.real_functions import cosine_of_turn, power_of, sine_of_turn
+from sbs_sim.model.records import aligned
 
 Array = NDArray[np.float64]
 
 SIDE = 256  # points along a side of a level
+LAST = SIDE - 1
+BESIDE = 3  # points behind a side, which are the first ones again: those of a cell are side by side everywhere
+# powers of t in the four weights of the uniform cubic B-spline, and in their derivatives
+SPLINE = np.array(
+    [[1 / 6, 2 / 3, 1 / 6, 0.0], [-0.5, 0.0, 0.5, 0.0], [0.5, -1.0, 0.5, 0.0], [-1 / 6, 0.5, -0.5, 1 / 6]]
+)
+SPLINE_SLOPES = SPLINE[1:] * np.array([[1.0], [2.0], [3.0]])
 LOWEST, HIGHEST = 4, 64  # waves along a side that a level has; the first one has them from 1 on
 RATIO = 16  # from the side of a level to that of the next
 LENGTHS = 40.0  # scale lengths along the side of the first level
 SHORTEST = 0.25  # m, wave length that the last level reaches at least
 TURN_COSINE, TURN_SINE = 0.5403023058681398, 0.8414709848078965  # of 1 rad, from a level to the next
+MOST_LEVELS = 8  # that there is room for; the longest scale length has five
+# rows of the memory of a sample, levels in the columns: cells along both axes, weights of the points of a cell along
+# each, and their derivatives
+CELL, T, U, T_SLOPE, U_SLOPE, WEIGHTS = 0, 2, 6, 10, 14, 18
+
+
+def _turns() -> Array:
+    """Cosine and sine of the turn of each level, and the side of the first level over its own, shape (3, levels)."""
+    found = [(1.0, 0.0, 1.0)]
+    for _ in range(MOST_LEVELS - 1):
+        c, s, scale = found[-1]
+        found.append((c * TURN_COSINE - s * TURN_SINE, s * TURN_COSINE + c * TURN_SINE, scale * RATIO))
+    return np.array(found).T.copy()
+
+
+TURN_COSINES, TURN_SINES, SCALES = _turns()
+TURN_COSINES_OF_FOUR, TURN_SINES_OF_FOUR, SCALES_OF_FOUR = _turns().reshape(3, -1, 4)
 KARMAN = 1.339  # a of von Karman's spectrum
 DRYDEN, VON_KARMAN = "dryden", "von_karman"
 CACHED = 8  # fields that are kept for those who ask again
@@ -47,8 +73,9 @@ def field_grids(model: str, length: float, vertical_length: float, seed: int) ->
 
     Returns
     -------
-    grids : ndarray, shape (levels, SIDE, SIDE, 3)
-        Coefficients of the spline at points along north and east: components north, east, down.
+    grids : ndarray, shape (levels, SIDE + BESIDE, SIDE + BESIDE, 4)
+        Coefficients of the spline at points along the axes of each level: components north, east, down, and 0, which
+        makes a register of them. The last ones of an axis are the first ones again.
     period : float
         Of the first level [m].
     """
@@ -57,7 +84,7 @@ def field_grids(model: str, length: float, vertical_length: float, seed: int) ->
     levels = 1
     while period / RATIO ** (levels - 1) > HIGHEST * SHORTEST:
         levels += 1
-    grids = np.empty((levels, SIDE, SIDE, 3))
+    grids = aligned((levels, SIDE + BESIDE, SIDE + BESIDE, 4), float)
     waves = _twiddles()
     for level in range(levels):
         noise = normal(source, 3 * (2 * HIGHEST + 1) ** 2).reshape(-1, 3, 2)
@@ -69,7 +96,10 @@ def field_grids(model: str, length: float, vertical_length: float, seed: int) ->
                 *(1 if level == 0 else LOWEST, waves, real[0], imaginary[0]),
             )
             _transform(real[0], imaginary[0], waves)
-            grids[level, :, :, component] = real[0]
+            grids[level, :SIDE, :SIDE, component] = real[0]
+        grids[level, SIDE:] = grids[level, :BESIDE]
+        grids[level, :, SIDE:] = grids[level, :, :BESIDE]
+        _turn(grids[level], TURN_COSINES[level], TURN_SINES[level])
     return grids, period
 
 
@@ -84,6 +114,15 @@ def _twiddles() -> Array:
 def _fill_twiddles(waves):
     for i in range(waves.shape[0]):
         waves[i, 0], waves[i, 1] = cosine_of_turn(i / waves.shape[0]), sine_of_turn(i / waves.shape[0])
+
+
+@entry
+def _turn(grid, c, s):
+    """Components along the axes of a level as those to the north and to the east."""
+    for i in range(grid.shape[0]):
+        for j in range(grid.shape[1]):
+            a, b = grid[i, j, 0], grid[i, j, 1]
+            grid[i, j, 0], grid[i, j, 1] = c * a - s * b, s * a + c * b
 
 
 @entry
@@ -180,102 +219,113 @@ def transform_columns(real, imaginary, waves):
 
 
 @kernel
-def sampled(grids, first, levels, period, x, y):
+def sampled(grids, first, levels, period, x, y, memory):
     """Velocity at a point, and its derivatives.
 
     Parameters
     ----------
-    grids : ndarray, shape (m, SIDE, SIDE, 3)
+    grids : quads, shape (m, SIDE + BESIDE, SIDE + BESIDE)
     first, levels : int
         Levels that belong to the field.
     period : float
         Of the first of them [m].
     x, y : float
         Towards north and east in the field [m].
+    memory : ndarray, shape (WEIGHTS, 4)
 
     Returns
     -------
-    tuple of 9 floats
-        Components north, east, down, and their derivatives to the north and to the east [1/m].
+    tuple of 3 lanes
+        Components north, east, down (and 0), and their derivatives to the north and to the east [1/m].
     """
-    n = e = d = n_x = e_x = d_x = n_y = e_y = d_y = 0.0
-    side, c, s = period, 1.0, 0.0
-    for level in range(first, first + levels):
-        found = sampled_level(grids, level, side, c * x + s * y, c * y - s * x)
-        a, b, down, a_x, b_x, down_x, a_y, b_y, down_y = found
-        n += c * a - s * b
-        e += s * a + c * b
-        d += down
-        # of the components to the north and to the east, by the axes of the level
-        p, q = c * a_x - s * b_x, c * a_y - s * b_y
-        n_x += c * p - s * q
-        n_y += s * p + c * q
-        p, q = s * a_x + c * b_x, s * a_y + c * b_y
-        e_x += c * p - s * q
-        e_y += s * p + c * q
-        d_x += c * down_x - s * down_y
-        d_y += s * down_x + c * down_y
-        side, c, s = side / RATIO, c * TURN_COSINE - s * TURN_SINE, s * TURN_COSINE + c * TURN_SINE
-    return n, e, d, n_x, e_x, d_x, n_y, e_y, d_y
+    value = zeros_like(grids[0, 0, 0])
+    by_north, by_east = value, value
+    for begin in range(0, levels, 4):
+        set_weights(begin, period, x, y, memory, True)
+        for k in range(min(4, levels - begin)):
+            i, j, grid = cell(memory[CELL, k]), cell(memory[CELL + 1, k]), grids[first + begin + k]
+            along = across = zeros_like(value)
+            for m in range(4):
+                row = grid[i + m]
+                g0, g1, g2, g3 = row[j], row[j + 1], row[j + 2], row[j + 3]
+                own = (memory[U, k] * g0 + memory[U + 1, k] * g1) + (memory[U + 2, k] * g2 + memory[U + 3, k] * g3)
+                slope = (memory[U_SLOPE, k] * g0 + memory[U_SLOPE + 1, k] * g1) + (
+                    memory[U_SLOPE + 2, k] * g2 + memory[U_SLOPE + 3, k] * g3
+                )
+                value = value + memory[T + m, k] * own
+                along = along + memory[T_SLOPE + m, k] * own
+                across = across + memory[T + m, k] * slope
+            per_cell = SIDE / period * SCALES[begin + k]
+            p, q = TURN_COSINES[begin + k] * per_cell, TURN_SINES[begin + k] * per_cell
+            by_north = by_north + p * along
+            by_north = by_north - q * across
+            by_east = by_east + q * along
+            by_east = by_east + p * across
+    return value, by_north, by_east
 
 
 @kernel
-def sampled_level(grids, level, side, x, y):
-    """Velocity and derivatives of a level along its own axes, at a point in these; `side` is its period [m]."""
-    n = e = d = n_x = e_x = d_x = n_y = e_y = d_y = 0.0
-    u, v = SIDE * (x / side - math.floor(x / side)), SIDE * (y / side - math.floor(y / side))
-    i, j = int(u), int(v)
-    per_cell = SIDE / side
-    a, b = spline(u - i), spline(v - j)
-    a_x, b_y = spline_slopes(u - i), spline_slopes(v - j)
+def sampled_value(grids, first, levels, period, x, y, memory):
+    """Velocity alone, see `sampled`."""
+    value = zeros_like(grids[0, 0, 0])
+    for begin in range(0, levels, 4):
+        set_weights(begin, period, x, y, memory, False)
+        for k in range(min(4, levels - begin)):
+            i, j, grid = cell(memory[CELL, k]), cell(memory[CELL + 1, k]), grids[first + begin + k]
+            u0, u1, u2, u3 = memory[U, k], memory[U + 1, k], memory[U + 2, k], memory[U + 3, k]
+            for m in range(4):
+                row = grid[i + m]
+                own = (u0 * row[j] + u1 * row[j + 1]) + (u2 * row[j + 2] + u3 * row[j + 3])
+                value = value + memory[T + m, k] * own
+    return value
+
+
+@kernel
+def set_weights(begin, period, x, y, memory, sloped):
+    """Set cells and weights of a point on four levels at once, the levels in the lanes: those of CELL, T, U and slopes.
+
+    The uniform cubic B-spline weighs four points along each axis of a level by how far the point is in its cell.
+    """
+    quads, group, per_cell = as_quads(memory), begin // 4, SIDE / period
+    c, s = as_quads(TURN_COSINES_OF_FOUR)[group], as_quads(TURN_SINES_OF_FOUR)[group]
+    scale = rounded(as_quads(SCALES_OF_FOUR)[group] * per_cell)
+    p = rounded((rounded(c * x) + rounded(s * y)) * scale)
+    q = rounded((rounded(c * y) - rounded(s * x)) * scale)
+    whole_p, whole_q = floor(p), floor(q)
+    quads[CELL], quads[CELL + 1] = whole_p, whole_q
+    t, u = p - whole_p, q - whole_q
     for k in range(4):
-        row = (i + k - 1) & (SIDE - 1)
-        r0 = r1 = r2 = s0 = s1 = s2 = 0.0
-        for m in range(4):
-            column = (j + m - 1) & (SIDE - 1)
-            w, slope = b[m], b_y[m]
-            r0 += w * grids[level, row, column, 0]
-            r1 += w * grids[level, row, column, 1]
-            r2 += w * grids[level, row, column, 2]
-            s0 += slope * grids[level, row, column, 0]
-            s1 += slope * grids[level, row, column, 1]
-            s2 += slope * grids[level, row, column, 2]
-        n += a[k] * r0
-        e += a[k] * r1
-        d += a[k] * r2
-        n_x += per_cell * (a_x[k] * r0)
-        e_x += per_cell * (a_x[k] * r1)
-        d_x += per_cell * (a_x[k] * r2)
-        n_y += per_cell * (a[k] * s0)
-        e_y += per_cell * (a[k] * s1)
-        d_y += per_cell * (a[k] * s2)
-    return n, e, d, n_x, e_x, d_x, n_y, e_y, d_y
+        quads[T + k] = SPLINE[0, k] + t * (SPLINE[1, k] + t * (SPLINE[2, k] + t * SPLINE[3, k]))
+        quads[U + k] = SPLINE[0, k] + u * (SPLINE[1, k] + u * (SPLINE[2, k] + u * SPLINE[3, k]))
+        if sloped:
+            quads[T_SLOPE + k] = SPLINE_SLOPES[0, k] + t * (SPLINE_SLOPES[1, k] + t * SPLINE_SLOPES[2, k])
+            quads[U_SLOPE + k] = SPLINE_SLOPES[0, k] + u * (SPLINE_SLOPES[1, k] + u * SPLINE_SLOPES[2, k])
 
 
 @kernel
-def spline(t):
-    """Weights of four points around a point at t from 0 to 1 behind the second: the uniform cubic B-spline."""
-    r = 1.0 - t
-    square, cube = t * t, t * t * t
-    return (
-        r * r * r / 6.0,
-        2.0 / 3.0 - square + 0.5 * cube,
-        2.0 / 3.0 - r * r + 0.5 * (r * r * r),
-        cube / 6.0,
-    )
-
-
-@kernel
-def spline_slopes(t):
-    """Derivatives of `spline`."""
-    r = 1.0 - t
-    return -0.5 * (r * r), -2.0 * t + 1.5 * (t * t), 2.0 * r - 1.5 * (r * r), 0.5 * (t * t)
+def cell(whole):
+    """First of the four points around a position in a cell of a number: within the side, and three more behind it."""
+    return (int(whole) - 1) & LAST
 
 
 @entry
-def sample_field(grids, period, points, out):
-    """Components of a field at points, shape (m, 2) to (m, 9), see `sampled`."""
+def sample_field(grids, period, points, memory, out):
+    """Components of a field at points, and their derivatives to the north and to the east, see `sampled`.
+
+    Parameters
+    ----------
+    grids : ndarray, shape (m, SIDE + BESIDE, SIDE + BESIDE, 4)
+    period : float
+        [m]
+    points : ndarray, shape (n, 2)
+        [m]
+    memory : ndarray, shape (WEIGHTS, 4)
+    out : ndarray, shape (n, 4, 4)
+        Output: velocity, derivatives, and the velocity once more, as it is without them.
+    """
+    levels, found = as_quads(grids), as_quads(out)
     for i in range(points.shape[0]):
-        found = sampled(grids, 0, grids.shape[0], period, points[i, 0], points[i, 1])
-        for k in range(9):
-            out[i, k] = found[k]
+        x, y = points[i, 0], points[i, 1]
+        own = sampled(levels, 0, grids.shape[0], period, x, y, memory)
+        alone = sampled_value(levels, 0, grids.shape[0], period, x, y, memory)
+        found[i, 0], found[i, 1], found[i, 2], found[i, 3] = own[0], own[1], own[2], alone

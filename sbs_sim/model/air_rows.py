@@ -12,7 +12,7 @@ from sbs_sim.model.duct import sheltered
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.offset import Flow
 from sbs_sim.model.records import GUST_ROWS, Model
-from sbs_sim.model.section import SectionFlow
+from sbs_sim.model.section import SectionFlow, SpanFlow
 from sbs_sim.model.state import vector_at
 
 CG_ROWS, PART_ROWS = 3, 3
@@ -57,12 +57,27 @@ def gust_of_blade(aircraft, air, blade, first):
 def gust_along_blade(aircraft, air, blade, basis):
     """Change of the air's velocity from the hub to the flap hinge [m/s], and its slope along the blade [1/s].
 
-    Along (y, t, u). The position of a section in the disc is its distance from the hub along y and t.
+    Along (y, t, u), within a duct if there is one. The position of a section in the disc is its distance from the hub
+    along y and t.
     """
     by_x = gust_of_blade(aircraft, air, blade, ALONG_X)
     by_y = gust_of_blade(aircraft, air, blade, ALONG_Y)
     if aircraft.switches[0].ducts == 1:
         by_x, by_y = sheltered(blade.duct_turning, by_x), sheltered(blade.duct_turning, by_y)
+    return change_along_blade(blade, basis, by_x, by_y)
+
+
+@kernel
+def free_gust_along_blade(aircraft, air, blade, basis):
+    """The same without a duct."""
+    by_x = gust_of_blade(aircraft, air, blade, ALONG_X)
+    by_y = gust_of_blade(aircraft, air, blade, ALONG_Y)
+    return change_along_blade(blade, basis, by_x, by_y)
+
+
+@kernel
+def change_along_blade(blade, basis, by_x, by_y):
+    """Change to the flap hinge and slope along the blade of what changes along the axes of its hub."""
     c, s, sense = basis.cosine, basis.sine, blade.sense
     outwards = to_blade(blade, basis, by_y * (sense * s) - by_x * c)
     forwards = to_blade(blade, basis, by_x * s + by_y * (sense * c))
@@ -80,6 +95,13 @@ def with_gust_gradients(aircraft, air, blade, basis, flow):
         u_p_hinge=flow.u_p_hinge - dot(basis.normal, hinge),
         u_p_slope=flow.u_p_slope - dot(basis.normal, slope),
     )
+
+
+@kernel
+def span_with_gust_gradients(aircraft, air, blade, basis, along):
+    """Flow along the span with the same change."""
+    hinge, slope = gust_along_blade(aircraft, air, blade, basis)
+    return SpanFlow(along.hinge - dot(basis.span, hinge), along.slope - dot(basis.span, slope))
 
 
 @kernel

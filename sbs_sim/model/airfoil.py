@@ -79,6 +79,17 @@ class AirfoilTable(ByContent):
         """Steps between an angle and the next."""
         return np.rint(np.diff(self.alpha) / (np.pi / self.half))
 
+    @cached_property
+    def zero_lift_angle(self) -> float:
+        """Angle of attack without lift [rad] at the middle one of its numbers, that nearest to zero."""
+        lift = self.cl[len(self.numbers) // 2]
+        rises = np.flatnonzero((lift[:-1] <= 0.0) & (lift[1:] > 0.0))
+        if not len(rises):
+            return 0.0
+        share = lift[rises] / (lift[rises] - lift[rises + 1])
+        angles = self.alpha[rises] + share * (self.alpha[rises + 1] - self.alpha[rises])
+        return float(angles[np.argmin(np.abs(angles))])
+
     @property
     def knots(self) -> Array:
         """Numbers between which the compiled model interpolates, at least two."""
@@ -142,12 +153,27 @@ def stall_angles(table: AirfoilTable) -> tuple[Array, Array]:
     return np.minimum(above, highest), -np.minimum(below, -lowest)
 
 
-def _max_lift_angle(alpha: Array, cl: Array) -> float:
-    """Angle of maximum lift of attached flow, upwards from 0 [rad]; pi where there is no lift."""
+def attached_lift(table: AirfoilTable) -> tuple[Array, Array]:
+    """Slope [1/rad] and angle without lift [rad] of attached flow, each of shape (n,), by the curve around zero."""
+    lines = [_attached_line(table.alpha, cl) for cl in table.cl]
+    slopes = np.array([max(slope, 0.0) for slope, _, _ in lines])
+    angles = np.array([-at_zero / slope if slope > 0.0 else 0.0 for slope, at_zero, _ in lines])
+    return slopes, angles
+
+
+def _attached_line(alpha: Array, cl: Array) -> tuple[float, float, float]:
+    """Slope of the lift around zero [1/rad], lift there, and the angle up to which they are fitted [rad]."""
     middle = int(np.argmin(np.abs(alpha)))
     attached = max(ATTACHED, 1.5 * (alpha[middle + 1] - alpha[middle]), 1.5 * (alpha[middle] - alpha[middle - 1]))
     near = np.abs(alpha) < attached
     slope, at_zero = np.polyfit(alpha[near], cl[near], 1)
+    return float(slope), float(at_zero), float(attached)
+
+
+def _max_lift_angle(alpha: Array, cl: Array) -> float:
+    """Angle of maximum lift of attached flow, upwards from 0 [rad]; pi where there is no lift."""
+    middle = int(np.argmin(np.abs(alpha)))
+    slope, at_zero, attached = _attached_line(alpha, cl)
     if slope <= 0.0:
         return math.pi
     angles, lift = alpha[middle:], cl[middle:]
@@ -325,7 +351,8 @@ def _parse_rows(path: Path, text: str) -> tuple[tuple[str, ...], Array, list[int
     columns = tuple(header.replace(" ", "").split(","))
     if columns not in COLUMNS:
         both = "; a table over both Reynolds and Mach number is not read" if set(AXES) <= set(columns) else ""
-        raise AirfoilError(f"{path}:{number}: header {header[:60]!r} must be {HEADERS}{both}")
+        other = "" if "," in header else "; the command airfoil makes tables of C81, XFOIL and AeroDyn files"
+        raise AirfoilError(f"{path}:{number}: header {header[:60]!r} must be {HEADERS}{both}{other}")
     rows = [_parse_row(path, i, line, columns) for i, line in content[1:]]
     if not rows:
         raise AirfoilError(f"{path}:{number}: no rows follow the header")

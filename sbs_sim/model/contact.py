@@ -9,7 +9,21 @@ spring then gives way. Its deflections are states, so that what stands does not 
 
 from typing import Any, NamedTuple
 
-from sbs_sim.lanes import Vector, as_lanes, as_records, cross, dot, maximum, minimum, rounded, select, sqrt, transposed
+from sbs_sim.lanes import (
+    Vector,
+    any_lane,
+    as_lanes,
+    as_records,
+    cross,
+    dot,
+    maximum,
+    minimum,
+    rounded,
+    select,
+    sqrt,
+    transposed,
+    zeros_like,
+)
 from sbs_sim.model import state as S
 from sbs_sim.model.blade import ForceMoment
 from sbs_sim.model.frames import rotation
@@ -43,11 +57,16 @@ class Touch(NamedTuple):
 
 
 @kernel
+def depth_of(ground, point, x, to_earth):
+    """How far a point is below the ground [m]."""
+    return dot(ground.down, S.vector_at(x, S.POSITION) + to_earth @ point.position) - ground.depth
+
+
+@kernel
 def touch(ground, point, x, to_earth, velocity, omega):
     """Depth, normal force and velocity of a point, eqs. (7.18) and (7.19)."""
-    place = S.vector_at(x, S.POSITION) + to_earth @ point.position
     motion = to_earth @ (velocity + cross(omega, point.position))
-    depth = dot(ground.down, place) - ground.depth
+    depth = depth_of(ground, point, x, to_earth)
     share = minimum(maximum(depth * point.inverse_onset, 0.0), 1.0)
     spring = point.stiffness * maximum(depth, 0.0)
     normal = maximum(spring + (point.damping * share) * dot(ground.down, motion), 0.0)
@@ -82,26 +101,32 @@ def contact_force(ground, point, x, touching):
 
 
 @kernel
-def contact_load(ground, contacts, x, flight):
-    """Load of the ground on the aircraft about the c.g., body axes [N, N m]."""
+def contact_load(ground, contacts, memory, flight):
+    """Load of the ground on the aircraft about the c.g., body axes [N, N m]; the rates of the deflections are kept."""
     none = 0.0 * flight.velocity.x
     force, moment = Vector(none, none, none), Vector(none, none, none)
     for i in range(contacts.shape[0]):
+        memory.contact[0, i], memory.contact[1, i] = zeros_like(none), zeros_like(none)
+    height = ground.depth - dot(ground.down, S.vector_at(memory.state, S.POSITION))
+    if not any_lane(height < ground.reach):
+        return ForceMoment(force, moment)
+    for i in range(contacts.shape[0]):
         point = contacts[i]
-        touching = touch(ground, point, x, flight.to_earth, flight.velocity, flight.omega)
-        own = transposed(flight.to_earth) @ contact_force(ground, point, x, touching)
+        if not any_lane(depth_of(ground, point, memory.state, flight.to_earth) > 0.0):
+            continue
+        touching = touch(ground, point, memory.state, flight.to_earth, flight.velocity, flight.omega)
+        memory.contact[0, i] = select(touching.depth > 0.0, touching.first, 0.0)
+        memory.contact[1, i] = select(touching.depth > 0.0, touching.second, 0.0)
+        own = transposed(flight.to_earth) @ contact_force(ground, point, memory.state, touching)
         force, moment = force + own, moment + cross(point.position, own)
     return ForceMoment(force, moment)
 
 
 @kernel
-def set_contact_rates(ground, contacts, x, flight, dx):
-    """Set the rates of the deflections along the ground: the velocity of what touches it."""
+def set_contact_rates(contacts, rates, dx):
+    """Set the rates of the deflections along the ground: the velocity of what touches it, as `contact_load` kept it."""
     for i in range(contacts.shape[0]):
-        point = contacts[i]
-        touching = touch(ground, point, x, flight.to_earth, flight.velocity, flight.omega)
-        dx[point.state] = select(touching.depth > 0.0, touching.first, 0.0)
-        dx[point.state + 1] = select(touching.depth > 0.0, touching.second, 0.0)
+        dx[contacts[i].state], dx[contacts[i].state + 1] = rates[0, i], rates[1, i]
 
 
 @kernel

@@ -7,7 +7,7 @@ that the dynamic inflow stays explicit in its states.
 
 import numpy as np
 
-from sbs_sim.lanes import maximum, minimum, rounded, select, zeros_like
+from sbs_sim.lanes import any_lane, maximum, minimum, rounded, select, table_row, zeros_like
 from sbs_sim.model.cubics import bounded_slopes, pieces
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.trigonometry import TINY
@@ -36,7 +36,9 @@ def _curve() -> tuple[tuple[float, ...], tuple[tuple[float, float, float, float]
 
 
 KNOTS, PIECES = _curve()
-CONSTANTS, LINEARS, SQUARES, CUBES = zip(*PIECES, strict=True)  # by their power, for the loop over the pieces
+# Value and slope of the pieces by the power of what is beyond their knots; two zeros make a row of a table.
+ROWS = np.array([[a, b, 0, 0, b, 2 * c, 0, 0, c, 3 * d, 0, 0, d, 0, 0, 0] for a, b, c, d in PIECES])
+DEGREE = 3
 
 
 @kernel
@@ -49,18 +51,18 @@ def measured_flow(lambda0, descent):
     descent : lanes
         mu_z: velocity of the hub down along the shaft over the tip speed.
     """
-    ratio = rounded(descent * lambda0) / (lambda0 * lambda0 + TINY)
-    x = minimum(maximum(ratio, 0.0), WINDMILL)
-    start, a, b = zeros_like(x), zeros_like(x) + CONSTANTS[0], zeros_like(x) + LINEARS[0]
-    c, d = zeros_like(x) + SQUARES[0], zeros_like(x) + CUBES[0]
-    for k in range(1, len(CONSTANTS)):
-        begins = x >= KNOTS[k]
-        start, a, b = select(begins, KNOTS[k], start), select(begins, CONSTANTS[k], a), select(begins, LINEARS[k], b)
-        c, d = select(begins, SQUARES[k], c), select(begins, CUBES[k], d)
-    y = x - start
-    value, slope = a + y * (b + y * (c + y * d)), b + y * (2.0 * c + y * (3.0 * d))
-    descends = (ratio > 0.0) & (ratio < WINDMILL)
     through = lambda0 - descent
+    ratio = rounded(descent * lambda0) / (lambda0 * lambda0 + TINY)
+    descends = (ratio > 0.0) & (ratio < WINDMILL)
+    if not any_lane(descends):
+        return through, through + lambda0
+    x = minimum(maximum(ratio, 0.0), WINDMILL)
+    piece = start = zeros_like(x)
+    for k in range(1, len(PIECES)):
+        begins = x >= KNOTS[k]
+        piece, start = select(begins, 1.0 * k, piece), select(begins, KNOTS[k], start)
+    y = x - start
+    value, slope, _, _ = table_row(ROWS, piece, y, DEGREE)
     axial = select(descends, lambda0 * value, through)
     return axial, select(descends, lambda0 * (2.0 * value - x * slope), through + lambda0)
 

@@ -38,6 +38,7 @@ from sbs_sim.model.air_rows import (
     gust_of_rotor,
     in_space,
     offset_with_gust_gradients,
+    span_with_gust_gradients,
     with_gust_gradients,
 )
 from sbs_sim.model.blade import (
@@ -61,11 +62,12 @@ from sbs_sim.model.blade import (
 )
 from sbs_sim.model.contact import contact_load, set_contact_rates
 from sbs_sim.model.duct import duct_flow, duct_thrust, sheltered
+from sbs_sim.model.element_gusts import element_gusts, in_elements
 from sbs_sim.model.frames import quaternion_rates, rotation, shaft_down
 from sbs_sim.model.fuselage import plate_drag
 from sbs_sim.model.ground_effect import add_ground_wash
 from sbs_sim.model.inflow import INVERSE_MASS, Inflow, inflow_rates, rotor_flow
-from sbs_sim.model.interference import add_interference
+from sbs_sim.model.interference import add_interference, met_with_wash
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_accelerations, add_rotation_terms, blade_angle, set_accelerations
 from sbs_sim.model.offset import (
@@ -77,12 +79,21 @@ from sbs_sim.model.offset import (
     offset_air_loads,
     offset_flow,
 )
-from sbs_sim.model.records import OTHERS, WASH_ROWS
+from sbs_sim.model.records import LOAD, WASH_ROWS
+from sbs_sim.model.ring import add_ring
 from sbs_sim.model.section import section_loads
 from sbs_sim.model.section_options import optional_loads, span_flow
+from sbs_sim.model.separation import Separation
 from sbs_sim.model.surfaces import fuselage_load, ramp, rotor_wash, surface_load
 from sbs_sim.model.teeter import hold_coning, lock_coning
 from sbs_sim.model.trigonometry import cosine_sine
+from sbs_sim.model.unsteady_airfoil import (
+    offset_with_wake_gradient,
+    set_circulation,
+    set_circulation_rates,
+    span_with_wake_gradient,
+    with_wake_gradient,
+)
 
 
 class Aircraft(NamedTuple):
@@ -107,6 +118,7 @@ class Aircraft(NamedTuple):
     contacts: Any
     pairs: Any
     influences: Any
+    stall: Any
 
 
 class Memory(NamedTuple):
@@ -127,9 +139,16 @@ class Memory(NamedTuple):
     coning: Any
     coning_change: Any
     wash: Any
+    ring: Any
+    contact: Any
     commands: Any
     pitching: Any
     pitch_sums: Any
+    separation: Any
+    separation_rates: Any
+    separation_states: Any
+    separation_state_rates: Any
+    gusts: Any
 
 
 class Flight(NamedTuple):
@@ -218,16 +237,17 @@ def with_rotors(model, rotors, blades):
         contacts=as_records(model.contacts),
         pairs=as_records(model.pairs),
         influences=model.influences,
+        stall=as_lanes(model.stall, blades),
     )
 
 
 @kernel
 def memory_in_lanes(work):
     """Memory as records of lanes."""
-    sums = as_records(work.sums)
+    sums, terms = as_records(work.sums), as_records(work.terms)
     return Memory(
         state=as_lanes(work.state, sums),
-        terms=as_records(work.terms),
+        terms=terms,
         sums=sums,
         means=as_records(work.means),
         hubs=as_records(work.hubs),
@@ -241,9 +261,16 @@ def memory_in_lanes(work):
         coning=as_records(work.coning),
         coning_change=as_lanes(work.coning_change, sums),
         wash=as_lanes(work.wash, sums),
+        ring=as_lanes(work.ring, sums),
+        contact=as_lanes(work.contact, sums),
         commands=as_lanes(work.commands, sums),
         pitching=as_records(work.pitching),
         pitch_sums=as_records(work.pitch_sums),
+        separation=as_lanes(work.separation, terms),
+        separation_rates=as_lanes(work.separation_rates, terms),
+        separation_states=as_lanes(work.separation_states, sums),
+        separation_state_rates=as_lanes(work.separation_state_rates, sums),
+        gusts=as_lanes(work.gusts, as_records(work.terms)),
     )
 
 
@@ -276,10 +303,15 @@ def set_known_loads(aircraft, memory, flight, swash, psi):
         set_commands(aircraft, memory, flight, swash)
         commands = memory.commands
     set_hub_velocities(aircraft, memory, flight)
+    first = memory.state.shape[0] - 1 - memory.separation_states.shape[0]
+    for i in range(memory.separation_states.shape[0]):
+        memory.separation_states[i] = memory.state[first + i]
     if aircraft.switches[0].wash == 1:
         set_wash(aircraft, memory)
         if aircraft.switches[0].ground_effect > 0:
             add_ground_wash(aircraft, memory, flight)
+        if aircraft.switches[0].ring == 1:
+            add_ring(aircraft, memory)
     set_blade_terms(aircraft, memory, flight, commands, psi)
     sum_blades(aircraft, memory)
     return body_loads(aircraft, memory, flight, commands)
@@ -301,8 +333,17 @@ def set_rates(aircraft, memory, flight, dx):
     if aircraft.switches[0].stand == 1:
         hold_locked_axes(aircraft, dx)
     if aircraft.switches[0].contact == 1:
-        set_contact_rates(aircraft.ground[0], aircraft.contacts, memory.state, flight, dx)
+        set_contact_rates(aircraft.contacts, memory.contact, dx)
     set_rotor_rates(aircraft, memory, dx)
+    first = memory.state.shape[0] - 1 - memory.separation_states.shape[0]
+    for i in range(memory.separation_states.shape[0]):
+        dx[first + i] = memory.separation_state_rates[i]
+
+
+@kernel
+def separation_of(aircraft, memory, r):
+    """Separation on the sections of a register r of blades."""
+    return Separation(memory.separation, memory.separation_rates, aircraft.stall[r])
 
 
 @kernel
@@ -363,9 +404,15 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
         if aircraft.switches[0].ducts == 1:
             air_velocity = sheltered(blade.duct_turning, air_velocity)
         flow = section_flow(blade, basis, motion, air_velocity, induced, gradient)
+        sampled, over_disc = in_elements(memory), flow
         if in_space(flight.air):
-            flow = with_gust_gradients(aircraft, flight.air, blade, basis, flow)
+            over_disc = with_gust_gradients(aircraft, flight.air, blade, basis, flow)
+            if not sampled:
+                flow = over_disc
         pitch = blade_pitch(aircraft, blade, pose, swash)
+        if aircraft.switches[0].unsteady_airfoil == 1:
+            set_circulation(aircraft.indices, memory, blade, terms, pose, over_disc, pitch)
+            flow = with_wake_gradient(blade, basis, flow, terms.wake_gradient)
         terms.u_t_hinge, terms.u_t_slope = flow.u_t_hinge, flow.u_t_slope
         terms.u_p_hinge, terms.u_p_slope = flow.u_p_hinge, flow.u_p_slope
         terms.pitch = pitch
@@ -373,17 +420,37 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
         if aircraft.switches[0].offsets == 1:
             turning = pitch_motion(aircraft, blade, pose, swash)
             turned = offset_flow(blade, basis, motion, turning.rate, air_velocity, induced, gradient)
-            if in_space(flight.air):
+            if in_space(flight.air) and not sampled:
                 turned = offset_with_gust_gradients(aircraft, flight.air, blade, basis, turned)
-            met = offset_air_loads(air, blade, basis, elements, aircraft.knots[r], aircraft.table, turned, pitch)
+            if aircraft.switches[0].unsteady_airfoil == 1:
+                turned = offset_with_wake_gradient(blade, basis, turned, terms.wake_gradient)
+            met = met_by_offsets(aircraft, memory, r, basis, turned, pitch)
             at_hub = to_blade(blade, basis, hub.centripetal)
             set_offset_equations(aircraft, memory, r, pose, basis, motion, met, at_hub, pitch, turning)
             continue
-        if aircraft.switches[0].section_options == 1:
+        if sampled:
             along = span_flow(blade, basis, motion, air_velocity, induced, gradient)
-            loads, terms.outward_force, _ = optional_loads(
+            if aircraft.switches[0].unsteady_airfoil == 1:
+                along = span_with_wake_gradient(blade, basis, along, terms.wake_gradient)
+            loads, terms.outward_force, _, _ = optional_loads(
                 *(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, along, pitch),
                 induced - air_velocity.z,
+                aircraft.switches[0],
+                separation_of(aircraft, memory, r),
+                element_gusts(memory, blade, basis, r),
+            )
+        elif aircraft.switches[0].section_options > 0:
+            along = span_flow(blade, basis, motion, air_velocity, induced, gradient)
+            if in_space(flight.air):
+                along = span_with_gust_gradients(aircraft, flight.air, blade, basis, along)
+            if aircraft.switches[0].unsteady_airfoil == 1:
+                along = span_with_wake_gradient(blade, basis, along, terms.wake_gradient)
+            loads, terms.outward_force, _, _ = optional_loads(
+                *(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, along, pitch),
+                induced - air_velocity.z,
+                aircraft.switches[0],
+                separation_of(aircraft, memory, r),
+                None,
             )
         else:
             loads = section_loads(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, pitch)
@@ -394,6 +461,17 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
             gravity = transposed(blade.axes) @ flight.gravity
             at_hinges, at_hub = -to_blade(blade, basis, gravity), Vector(0.0, 0.0, 0.0)
         set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at_hub, swash, pitch)
+
+
+@kernel
+def met_by_offsets(aircraft, memory, r, basis, flow, pitch):
+    """Air loads of a register of blades with offsets; see `sbs_sim.model.offset.offset_air_loads`."""
+    blade, air, knots = aircraft.blades[r], aircraft.air[0], aircraft.knots[r]
+    elements = aircraft.elements[blade.elements]
+    if in_elements(memory):
+        gusts = element_gusts(memory, blade, basis, r)
+        return offset_air_loads(air, blade, basis, elements, knots, aircraft.table, flow, pitch, gusts)
+    return offset_air_loads(air, blade, basis, elements, knots, aircraft.table, flow, pitch, None)
 
 
 @kernel
@@ -559,7 +637,7 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
     flap, lag = hinge_columns(blade, basis)
     flap, lag = about_cg(blade, basis, flap), about_cg(blade, basis, lag)
     on_hub = known_loads(blade, basis, loads, own.hinge + at_hub, own.slope)
-    if aircraft.switches[0].section_options == 1:
+    if aircraft.switches[0].section_options > 0:
         on_hub = with_outward_force(basis, on_hub, terms.outward_force)
     known = about_cg(blade, basis, on_hub)
     inverse_lag_inertia = blade.lead_lag * moments.inverse_lag_inertia
@@ -567,7 +645,7 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
     if aircraft.switches[0].complete_hub_moment == 0:
         terms.paper_moment, terms.flap_axis = paper_moment(blade, basis, pose, loads)
     thrust = rounded(basis.cos_flap * loads.normal_force)
-    if aircraft.switches[0].section_options == 1:
+    if aircraft.switches[0].section_options > 0:
         thrust = thrust + basis.span.z * terms.outward_force
     root_moment = blade.hinge_offset * loads.normal_force + loads.normal_moment  # Int (e_0 + s) dF_n
     inertia, inverse = locked_inertia(blade, basis), blade.inverse_second_moment
@@ -684,23 +762,37 @@ def body_loads(aircraft, memory, flight, swash):
         duct = duct_load(aircraft, memory, j)
         force, moment = force + duct.force, moment + duct.moment
     for i in range(aircraft.surfaces.shape[0]):
-        surface, ramps = aircraft.surfaces[i], aircraft.ramps[i]
-        wash = wash_at(aircraft, memory, surface, ramps)
-        if in_space(flight.air):
-            wash = wash - gust_of_part(aircraft, flight.air, i)
-        load = surface_load(air.density, surface, ramps, aircraft.shapes, swash, flight.air_velocity, omega, wash)
+        load = load_of_surface(aircraft, memory, flight, swash, i)
         force, moment = force + load.force, moment + load.moment
     for i in range(aircraft.fuselages.shape[0]):
-        fuselage, ramps = aircraft.fuselages[i], aircraft.ramps[aircraft.surfaces.shape[0] + i]
-        wash = wash_at(aircraft, memory, fuselage, ramps)
-        if in_space(flight.air):
-            wash = wash - gust_of_part(aircraft, flight.air, aircraft.surfaces.shape[0] + i)
-        load = fuselage_load(air.density, fuselage, aircraft.shapes, flight.air_velocity, omega, wash)
+        load = load_of_fuselage(aircraft, memory, flight, i)
         force, moment = force + load.force, moment + load.moment
     if aircraft.switches[0].contact == 1:
-        ground = contact_load(aircraft.ground[0], aircraft.contacts, memory.state, flight)
+        ground = contact_load(aircraft.ground[0], aircraft.contacts, memory, flight)
         force, moment = force + ground.force, moment + ground.moment
     return ForceMoment(force, moment)
+
+
+@kernel
+def load_of_surface(aircraft, memory, flight, swash, i):
+    """Load of the air on a lifting surface about the c.g., body axes."""
+    surface, ramps = aircraft.surfaces[i], aircraft.ramps[i]
+    wash = wash_at(aircraft, memory, surface, ramps)
+    if in_space(flight.air):
+        wash = wash - gust_of_part(aircraft, flight.air, i)
+    density, velocity = aircraft.air[0].density, flight.air_velocity
+    return surface_load(density, surface, ramps, aircraft.shapes, swash, velocity, flight.omega, wash)
+
+
+@kernel
+def load_of_fuselage(aircraft, memory, flight, i):
+    """Load of the air on a fuselage with tables about the c.g., body axes."""
+    number = aircraft.surfaces.shape[0] + i
+    fuselage, ramps = aircraft.fuselages[i], aircraft.ramps[number]
+    wash = wash_at(aircraft, memory, fuselage, ramps)
+    if in_space(flight.air):
+        wash = wash - gust_of_part(aircraft, flight.air, number)
+    return fuselage_load(aircraft.air[0].density, fuselage, aircraft.shapes, flight.air_velocity, flight.omega, wash)
 
 
 @kernel
@@ -1066,6 +1158,8 @@ def set_rotor_rates(aircraft, memory, dx):
         add_rotation_terms(rotor, x, dx, rotor.flap, rotor.flap_rate, 1.0)
         add_rotation_terms(rotor, x, dx, rotor.lag, rotor.lag_rate, 1.0 * lead_lag)
         set_inflow_rates(aircraft, memory, j, dx)
+    if aircraft.switches[0].unsteady_airfoil == 1:
+        set_circulation_rates(aircraft, memory, dx)
 
 
 @kernel
@@ -1093,12 +1187,6 @@ def flow_of_duct(aircraft, memory, j):
     else:
         flow = duct_flow(rotor, uniform, mu)
     return flow
-
-
-@kernel
-def met_with_wash(memory, j, mu):
-    """Velocity of a hub relative to the air that the other rotors move, over the tip speed, hub axes."""
-    return Vector(mu.x, mu.y, mu.z - memory.wash[OTHERS, j])
 
 
 @kernel
@@ -1132,6 +1220,8 @@ def rates_of_inflow(aircraft, memory, j, loads):
     rotor, x = aircraft.rotors[j], memory.state
     states = Inflow(x[rotor.inflow + S.UNIFORM], x[rotor.inflow + S.COSINE], x[rotor.inflow + S.SINE])
     flow = flow_of_disc(aircraft, memory, j)
+    if aircraft.switches[0].ring == 1:  # the mean inflow is that of the mean thrust
+        loads = Inflow(loads.uniform + memory.ring[LOAD, j], loads.cosine, loads.sine)
     rates = inflow_rates(rotor, states, flow, loads, aircraft.switches[0].cyclic_inflow)
     uniform = rounded(rates.uniform)
     if rotor.duct == 1:

@@ -3,6 +3,7 @@
 from sbs_sim.model.air import add_air
 from sbs_sim.model.integrate import FLYING, copy_rows
 from sbs_sim.model.kernel import entry
+from sbs_sim.model.ring import set_ring_noise
 
 
 @entry
@@ -25,8 +26,8 @@ def fly(
         See `advance`.
     swash : ndarray, shape (ticks, 3 n_rotors, n), or one more
         Swashplate angles of each tick [rad]; after the last tick of a flight they are those it ends with.
-    winds : ndarray, shape (len(swash) or more, WIND_SIZE, n)
-        Air of each tick.
+    winds : ndarray, shape (len(swash) or more, WIND_SIZE, n), or (..., WIND_SIZE + 2 n_rotors, n)
+        Air of each tick; behind it the noise of vortex rings, see `Simulation.air_ahead`.
     ticks : int
         Number of ticks to fly.
     offset : int
@@ -52,9 +53,11 @@ def fly(
     row, look, first = 0, 0, step[0]
     steps_done = tick.done
     for i in range(swash.shape[0]):
+        if work.ring.shape[1] > 0:
+            set_ring_noise(model, winds[i], 0.0, work)
         if i == first_look + look * watch:
             if tick.space.parameters.shape[0] > 0:
-                add_air(model, x, winds[i], (first + i * steps) * h, 0.0, tick.space, look_air[look])
+                add_air(model, x, looks[look], winds[i], (first + i * steps) * h, 0.0, tick.space, look_air[look])
             derivative(model, x, swash[i], looks[look], look_air[look], work, tick.slopes[0], False)
             working_state(model, work, working[look])
             look += 1
@@ -62,7 +65,7 @@ def fly(
             copy_rows(x, states[row])
             if loaded:
                 if tick.space.parameters.shape[0] > 0:
-                    add_air(model, x, winds[i], (first + i * steps) * h, 0.0, tick.space, air[row])
+                    add_air(model, x, azimuths[row], winds[i], (first + i * steps) * h, 0.0, tick.space, air[row])
                 derivative(model, x, swash[i], azimuths[row], air[row], work, tick.slopes[0], True)
                 copy_rows(work.acceleration_rows[:3], forces[row])
                 copy_rows(work.load_rows, loads[row])

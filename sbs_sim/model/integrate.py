@@ -12,6 +12,7 @@ from sbs_sim.model.frames import Quaternion
 from sbs_sim.model.ground import lowest_coordinate
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.multiblade import add_rotation_terms
+from sbs_sim.model.ring import set_ring_noise
 from sbs_sim.model.state import BODY_SIZE, CONTACT_STATES, attitude_at, set_attitude
 from sbs_sim.model.wind import wind_at
 
@@ -65,8 +66,8 @@ def advance(derivative, model, x, swash, psi0, first_step, steps, h, wind, metho
     first_step, steps : int
     h : float
         Step [s].
-    wind : ndarray, shape (WIND_SIZE, n)
-        Air of this tick.
+    wind : ndarray, shape (WIND_SIZE, n), or (WIND_SIZE + 2 n_rotors, n)
+        Air of this tick; behind it the noise of the vortex rings at its beginning and at its end.
     method : int
         RK4, PARTITIONED, TSIT5 or ETD.
     bounds : ndarray, shape (size + 1, n)
@@ -85,8 +86,9 @@ def advance(derivative, model, x, swash, psi0, first_step, steps, h, wind, metho
         steps_done[lane] = 0
     for i in range(steps):
         make_step(
-            derivative, model, x, swash, psi0, first_step + i, h, wind, i / steps, 1.0 / steps, method, work, tick
-        )
+            derivative, model, x, swash, psi0, first_step + i, h, wind, i / steps, 1.0 / steps, method, work, tick,
+            i > 0
+        )  # fmt: skip
         if all_plausible(model, tick.stage, bounds, failed_state):
             copy_rows(tick.stage, x)
             for lane in range(failed_state.size):
@@ -96,24 +98,37 @@ def advance(derivative, model, x, swash, psi0, first_step, steps, h, wind, metho
 
 
 @kernel
-def make_step(derivative, model, x, swash, psi0, number, h, wind, fraction, share, method, work, tick):
-    """One step from x; the new state is left in `tick.stage`."""
+def make_step(derivative, model, x, swash, psi0, number, h, wind, fraction, share, method, work, tick, goes_on):
+    """One step from x; the new state is left in `tick.stage`.
+
+    Air that is not the same everywhere is sampled once for all stages at one time, and, where the step `goes_on` from
+    the one before it, for the last stage of that and the first one: they are apart by the third power of the step.
+    """
     rotors = as_records(model.rotors)
     state, stage, air = as_lanes(x, rotors), as_lanes(tick.stage, rotors), as_lanes(wind, rotors)
     slopes, psi, blowing = as_lanes(tick.slopes, rotors), as_lanes(tick.psi, rotors), as_lanes(tick.wind, rotors)
     start, tableau, count, time = as_lanes(psi0, rotors), TABLEAUS[method], STAGES[method], number * h
     contacts, size = model.contacts.shape[0], state.shape[0]
-    behind = size - CONTACT_STATES * contacts  # the deflections of what touches the ground
+    # the deflections of what touches the ground, and separation on sections
+    behind = size - CONTACT_STATES * contacts - work.separation_states.shape[0]
     if method == ETD:
         begin_exponential_step(rotors, tick.exponential, state)
+    local, sampled = tick.space.parameters.shape[0] > 0, 0.0 if goes_on else -1.0
     for k in range(count):
         ahead = node(tableau[k], k)
         if k == 0 or method != ETD:
             combine(state, slopes, tableau[k], k, h, 0, size, stage)
         set_azimuths(rotors, start, (number + ahead) * h, psi)
-        wind_at(air, time + ahead * h, fraction + ahead * share, blowing)
-        if tick.space.parameters.shape[0] > 0:
-            add_air(model, tick.stage, wind, time + ahead * h, fraction + ahead * share, tick.space, tick.wind)
+        if not local or ahead != sampled:
+            wind_at(air, time + ahead * h, fraction + ahead * share, blowing)
+            if local:
+                add_air(
+                    *(model, tick.stage, tick.psi, wind, time + ahead * h, fraction + ahead * share),
+                    *(tick.space, tick.wind),
+                )
+            sampled = ahead
+        if work.ring.shape[1] > 0:
+            set_ring_noise(model, wind, fraction + ahead * share, work)
         derivative(model, tick.stage, swash, tick.psi, tick.wind, work, tick.slopes[k], False)
         if method == PARTITIONED and k > 0:
             freeze_forcing(as_records(model.switches)[0], rotors, state, stage, slopes[0], slopes[k])

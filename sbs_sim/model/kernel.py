@@ -6,6 +6,7 @@ given the other's `Address` as an argument.
 """
 
 import contextlib
+import fcntl
 import functools
 import gc
 import logging
@@ -119,7 +120,23 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     if not numba.config.DISABLE_JIT:
         # numba would load first all that it could need to compile, scipy.linalg included, for a quarter of a second
         dispatcher._cache.load_overload = dispatcher._cache._load_overload
+        kept = dispatcher._cache._cache_file
+        kept.save = _alone(kept.save, folder)
     return _prepared(dispatcher)
+
+
+def _alone(save: Callable[..., None], folder: Path) -> Callable[..., None]:
+    """Save for one process at a time: two at once would give one name to machine code for different types."""
+
+    def save_alone(*arguments: Any) -> None:
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            save(*arguments)
+        finally:
+            os.close(descriptor)
+
+    return save_alone
 
 
 def _prepared(dispatcher: Any) -> Any:

@@ -105,6 +105,7 @@ def evaluate_inputs(derivative, model, inputs, rigging, work, tick):
     point, x, dx = as_lanes(inputs, rotors), as_lanes(tick.stage, rotors), as_lanes(tick.slopes, rotors)
     wind, swash = as_lanes(tick.wind, rotors), dx[1]
     unseen = len(S.UNSEEN_NAMES) * model.drives.shape[0] + S.CONTACT_STATES * model.contacts.shape[0]
+    unseen += work.separation_states.shape[0]
     set_state(point, x, x.shape[0] - unseen)
     for i in range(3):
         wind[i] = 0.0

@@ -72,9 +72,26 @@ def blade_angle(x, angles, rates, blade, cosine, sine):
 
 
 @kernel
+def blade_value(x, coordinates, blade, cosine, sine):
+    """Value of blades from the multiblade coordinates of their rotors; see `blade_angle`."""
+    quad, last = blade.quad, coordinates.shape[0] - 1
+    value, cn, sn = spread(x, coordinates[0], quad, blade), cosine, sine
+    for n in range(1, blade.harmonics + 1):
+        a, b = spread(x, coordinates[2 * n - 1], quad, blade), spread(x, coordinates[2 * n], quad, blade)
+        value = value - a * cn - b * sn
+        cn, sn = cn * cosine - sn * sine, sn * cosine + cn * sine
+    return value + blade.alternation * spread(x, coordinates[last], quad, blade)
+
+
+@kernel
 def add_accelerations(blade, terms, means, harmonics):
     """Add the accelerations of blades to the sums over their quads that the means of eq. (1.9) are made of."""
-    flap, lag = terms.flap_acceleration, terms.lag_acceleration
+    add_values(blade, terms, terms.flap_acceleration, terms.lag_acceleration, means, harmonics)
+
+
+@kernel
+def add_values(blade, terms, flap, lag, means, harmonics):
+    """Add two values of blades to the sums over their quads that their coordinates are made of."""
     add_to_quads(
         means, blade.quad, blade.starts_quad, "flap", (flap, lag, flap * blade.alternation, lag * blade.alternation)
     )
@@ -90,6 +107,12 @@ def add_accelerations(blade, terms, means, harmonics):
 @kernel
 def set_accelerations(rotor, means, harmonics, dx):
     """Set the accelerations of the coordinates of a rotor without the terms of their rotation, eq. (1.9)."""
+    set_coordinates(rotor, means, harmonics, dx, rotor.flap_rate, rotor.lag_rate)
+
+
+@kernel
+def set_coordinates(rotor, means, harmonics, dx, first, second):
+    """Set the coordinates of two values of the blades of a rotor, from two indices on."""
     share = rotor.inverse_blades
     flap = lag = flap_differential = lag_differential = 0.0
     for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
@@ -97,10 +120,10 @@ def set_accelerations(rotor, means, harmonics, dx):
         flap, lag = flap + own.flap, lag + own.lag
         flap_differential = flap_differential + own.flap_differential
         lag_differential = lag_differential + own.lag_differential
-    dx[rotor.flap_rate], dx[rotor.lag_rate] = share * flap, share * lag
+    dx[first], dx[second] = share * flap, share * lag
     last = rotor.blades - 1
     if rotor.blades % 2 == 0:
-        dx[rotor.flap_rate + last], dx[rotor.lag_rate + last] = share * flap_differential, share * lag_differential
+        dx[first + last], dx[second + last] = share * flap_differential, share * lag_differential
     twice = -2.0 * share
     for n in range(1, rotor.harmonics + 1):
         flap_cosine = flap_sine = lag_cosine = lag_sine = 0.0
@@ -109,8 +132,18 @@ def set_accelerations(rotor, means, harmonics, dx):
             flap_cosine, flap_sine = flap_cosine + part.flap_cosine, flap_sine + part.flap_sine
             lag_cosine, lag_sine = lag_cosine + part.lag_cosine, lag_sine + part.lag_sine
         i = 2 * n - 1
-        dx[rotor.flap_rate + i], dx[rotor.flap_rate + i + 1] = twice * flap_cosine, twice * flap_sine
-        dx[rotor.lag_rate + i], dx[rotor.lag_rate + i + 1] = twice * lag_cosine, twice * lag_sine
+        dx[first + i], dx[first + i + 1] = twice * flap_cosine, twice * flap_sine
+        dx[second + i], dx[second + i + 1] = twice * lag_cosine, twice * lag_sine
+
+
+@kernel
+def add_first_rotation_terms(rotor, x, dx, coordinates):
+    """Add the terms of the rotating coordinates to the first derivatives of those from an index on."""
+    for n in range(1, rotor.harmonics + 1):
+        i = coordinates + 2 * n - 1
+        harmonic = n * rotor.rotor_speed
+        a, b = x[i], x[i + 1]
+        dx[i], dx[i + 1] = dx[i] - harmonic * b, dx[i + 1] + harmonic * a
 
 
 @kernel

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from sbs_sim.lanes import ZERO, Vector, cross, dot, rounded, select, zeros_like
 from sbs_sim.model.blade import ForceMoment, blade_accelerations, to_blade, to_body
+from sbs_sim.model.element_gusts import free_gust_at, gust_at
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.section import DEGREE, table_cell, table_row
 from sbs_sim.model.trigonometry import TINY, angle_of, cosine_sine, inverse_root
@@ -94,12 +95,18 @@ class Flow(NamedTuple):
 
 
 class AirLoads(NamedTuple):
-    """Air loads of a blade: six-vector about p*, along (y, t, u); Int dF_n, Int s dF_n and Int s dF_d."""
+    """Air loads of a blade: six-vector about p*, along (y, t, u); Int dF_n, Int s dF_n, Int s dF_d, Int s dF_t.
+
+    `given` and `given_free` are forces times the velocity of the air at elements less that at the hub [W].
+    """
 
     load: Any
     normal_force: Any
     normal_moment: Any
     span_moment: Any
+    forward_moment: Any
+    given: Any
+    given_free: Any
 
 
 class Equations(NamedTuple):
@@ -303,7 +310,7 @@ def offset_flow(blade, basis, motion, pitch_rate, hub_velocity, induced, gradien
 
 
 @kernel
-def offset_air_loads(air, blade, basis, elements, knots, table, flow, pitch):
+def offset_air_loads(air, blade, basis, elements, knots, table, flow, pitch, gusts):
     """Air loads of blades whose quarter chord is not straight or not on the pitch axis, eqs. (4.12) and (4.13).
 
     Parameters
@@ -314,6 +321,8 @@ def offset_air_loads(air, blade, basis, elements, knots, table, flow, pitch):
     flow : Flow
     pitch : lanes
         Angle of the blade's root [rad].
+    gusts : ElementGusts or None
+        What the air at the elements differs by from that at the hub.
 
     Returns
     -------
@@ -321,7 +330,8 @@ def offset_air_loads(air, blade, basis, elements, knots, table, flow, pitch):
     """
     cos_pitch, sin_pitch = cosine_sine(pitch)
     zero = zeros_like(pitch)
-    force_d = force_t = force_n = moment_d = moment_t = moment_n = normal_moment = span_moment = zero
+    force_d = force_t = force_n = moment_d = moment_t = moment_n = normal_moment = span_moment = forward_moment = zero
+    given = given_free = zero
     for i in range(elements.shape[0]):
         element = elements[i]
         s = element.span
@@ -330,6 +340,9 @@ def offset_air_loads(air, blade, basis, elements, knots, table, flow, pitch):
         u_d = flow.start.x + flow.slope.x * s + (flow.turn.y * above - flow.turn.z * ahead)
         u_t = flow.start.y + flow.slope.y * s - flow.turn.x * above
         u_n = flow.start.z + flow.slope.z * s + flow.turn.x * ahead
+        if gusts is not None:
+            gust = gust_at(gusts, i)
+            u_d, u_t, u_n = u_d - gust.x, u_t - gust.y, u_n - gust.z
         c, sine = cosine_sine(pitch + element.twist)
         # in the plane across the quarter-chord line: along the chord, and normal to it
         u_chord = rounded(element.cos_sweep * (u_t * c + u_n * sine)) + element.sin_sweep * u_d
@@ -353,12 +366,20 @@ def offset_air_loads(air, blade, basis, elements, knots, table, flow, pitch):
         moment_t = moment_t + (above * f_d - s * f_n)
         moment_n = moment_n + (s * f_t - ahead * f_d)
         normal_moment, span_moment = normal_moment + s * f_n, span_moment + s * f_d
+        forward_moment = forward_moment + s * f_t
+        if gusts is not None:
+            load = Vector(f_d, rounded(f_t), rounded(f_n))
+            given = given + dot(load, gust_at(gusts, i))
+            given_free = given_free + dot(load, free_gust_at(gusts, i))
     d, t, n = basis.span, along_motion(), basis.normal
     return AirLoads(
         ForceMoment(d * force_d + t * force_t + n * force_n, d * moment_d + t * moment_t + n * moment_n),
         force_n,
         normal_moment,
         span_moment,
+        forward_moment,
+        given,
+        given_free,
     )
 
 

@@ -93,6 +93,8 @@ def by_blades(model: Model, width: int) -> Model:
         for lane, number in enumerate(_with_copies(register)):
             knots[r, :, lane], stall[r, ..., lane] = model.knots[number, :, 0], model.stall[number, ..., 0]
         blades[r]["quad"], blades[r]["starts_quad"], blades[r]["elements"] = r * width // QUAD, 1, r
+        each, count = 2 * QUAD // width, model.elements.shape[1]  # registers of eight blades, sections of one
+        blades[r]["separation_first"], blades[r]["separation_stride"] = r // each * count * each + r % each, each
     indices = StateIndices(*(_padded(part, len(quads)) for part in model.indices))
     return model._replace(blades=blades, elements=elements, knots=knots, indices=indices, stall=stall)
 
@@ -124,7 +126,7 @@ WEIGHTLESS = (
     "damper_damping",
     *("chord_first", "normal_first", "chord_product", "normal_product"),
     *("chord_second", "mixed_second", "normal_second"),
-    *("lead_lag", "alternation"),
+    *("lead_lag", "alternation", "wake_slow_rate", "wake_fast_rate"),
 )
 
 

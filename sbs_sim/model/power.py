@@ -21,6 +21,17 @@ from sbs_sim.lanes import (
     zeros_like,
 )
 from sbs_sim.model import state as S
+from sbs_sim.model.air_rows import (
+    AT_HUB,
+    free_gust_along_blade,
+    gust_along_blade,
+    gust_of_blade,
+    gust_of_part,
+    gust_of_rotor,
+    in_space,
+    offset_with_gust_gradients,
+    span_with_gust_gradients,
+)
 from sbs_sim.model.blade import (
     ForceMoment,
     HingeMoments,
@@ -43,18 +54,22 @@ from sbs_sim.model.dynamics import (
     hub_motion,
     in_lanes,
     induced_velocity,
+    load_of_fuselage,
+    load_of_surface,
     mass_matrix,
     memory_in_lanes,
+    met_by_offsets,
     pitch_motion,
     pitch_rate,
     rates_of_inflow,
+    separation_of,
     stand_loads,
     times,
     velocity_of_inflow,
-    wash_at,
     wash_of_blade,
     with_rotors,
 )
+from sbs_sim.model.element_gusts import element_gusts, in_elements
 from sbs_sim.model.fuselage import plate_drag
 from sbs_sim.model.inflow import INVERSE_INERTIA, INVERSE_MASS, Inflow
 from sbs_sim.model.kernel import entry, kernel
@@ -64,15 +79,13 @@ from sbs_sim.model.offset import (
     freedoms,
     known_field,
     of_mass,
-    offset_air_loads,
     offset_flow,
     pitched_mass,
     turned,
 )
-from sbs_sim.model.records import LANES
+from sbs_sim.model.records import LANES, NOISE
 from sbs_sim.model.section import SectionFlow, section_loads
 from sbs_sim.model.section_options import optional_loads, span_flow
-from sbs_sim.model.surfaces import fuselage_load, surface_load
 
 SUPPLY = ("engine", "actuators")
 POWER_TERMS = (
@@ -143,7 +156,7 @@ class Bodies(NamedTuple):
 
 
 @entry
-def power_rows(derivative, model, states, swash, psi, air, work, sums, dx, out):
+def power_rows(derivative, model, states, swash, psi, air, noise, work, sums, dx, out):
     """Power of every term at recorded instants.
 
     Parameters
@@ -152,8 +165,11 @@ def power_rows(derivative, model, states, swash, psi, air, work, sums, dx, out):
         Of the entry.
     model : Model
         `complete` coupling.
-    states, swash, psi, air : ndarray, shapes (rows, size, n), (rows, 3 n_rows, n), (rows, n_rotors, n), (rows, 3, n)
+    states, swash, psi, air : ndarray, shapes (rows, size, n), (rows, 3 n_rows, n), (rows, n_rotors, n),
+            (rows, 3, n) or (rows, air_rows(...), n)
         As `derivative` takes them.
+    noise : ndarray, shape (rows, n_rotors, n), or (rows, 0, n)
+        Of the vortex rings, see `Work.ring`.
     work : Work
     sums : structured ndarray BLADE_POWERS, shape (quads,)
         Memory.
@@ -163,6 +179,9 @@ def power_rows(derivative, model, states, swash, psi, air, work, sums, dx, out):
         Output [W].
     """
     for row in range(states.shape[0]):
+        for j in range(noise.shape[1]):
+            for lane in range(noise.shape[2]):
+                work.ring[NOISE, j, lane] = noise[row, j, lane]
         derivative(model, states[row], swash[row], psi[row], air[row], work, dx, True)
         aircraft, memory = in_lanes(model), memory_in_lanes(work)
         like = aircraft.air[0]
@@ -231,6 +250,8 @@ class Blade(NamedTuple):
         Along (y, t, u) [m/s^2].
     met : Vector
         Velocity of the hub relative to the air that the blades meet, hub axes [m/s].
+    gust : Vector
+        Velocity of the air at the hub less that at the c.g., hub axes [m/s].
     """
 
     pose: Any
@@ -242,6 +263,14 @@ class Blade(NamedTuple):
     speeding: Any
     gravity: Any
     met: Any
+    gust: Any
+
+
+@kernel
+def zero_vector(like):
+    """Vector of zeros."""
+    none = zeros_like(like)
+    return Vector(none, none, none)
 
 
 @kernel
@@ -254,7 +283,10 @@ def blade_at(aircraft, memory, bodies, psi, turning, r):
     if turning.shape[1] > 0:
         speeding = spread(turning[ACCELERATIONS], aircraft.indices.azimuth, record.quad, record)
     acceleration = to_hub @ (bodies.acceleration + cross(bodies.angular, record.hub)) + hub.centripetal
-    met = hub.air_velocity
+    met, gust = hub.air_velocity, zero_vector(pose.beta)
+    if in_space(flight.air):
+        gust = gust_of_blade(aircraft, flight.air, record, AT_HUB)
+        met = met - gust
     if aircraft.switches[0].ducts == 1:
         met = sheltered(record.duct_turning, met)
     return Blade(
@@ -267,31 +299,42 @@ def blade_at(aircraft, memory, bodies, psi, turning, r):
         speeding=speeding,
         gravity=to_blade(record, basis, to_hub @ flight.gravity),
         met=met,
+        gust=gust,
     )
 
 
 @kernel
 def blade_powers(aircraft, memory, bodies, commands, psi, turning, r):
     """Powers of a register of blades, in the order of BLADE_POWERS, eqs. (5.23) to (5.26)."""
-    record, terms = aircraft.blades[r], memory.terms[r]
+    record, terms, flight = aircraft.blades[r], memory.terms[r], bodies.flight
     blade = blade_at(aircraft, memory, bodies, psi, turning, r)
-    inflow = inflow_of(aircraft, memory, record, blade)
+    inflow = inflow_of(aircraft, memory, record, terms, blade)
     if aircraft.switches[0].offsets == 1:
         pitching = pitch_motion(aircraft, record, blade.pose, commands)
         kinetic, gravity = offset_energy(record, terms, blade, pitching, memory.pitching[r].slope)
-        air = offset_air_powers(aircraft, memory, r, blade, pitching, inflow)
+        air = offset_air_powers(aircraft, memory, flight, r, blade, pitching, inflow)
     else:
         kinetic, gravity = energy_rates(record, terms, blade)
-        air = air_powers(aircraft, memory, r, blade, inflow)
+        air = air_powers(aircraft, memory, flight, r, blade, inflow)
     hinges = hinge_powers(aircraft, record, terms, blade, commands)
-    to_hub, flight = transposed(record.axes), bodies.flight
-    carried = hub_motion(record, flight).air_velocity - blade.met
+    to_hub = transposed(record.axes)
+    carried = hub_motion(record, flight).air_velocity - blade.gust - blade.met
+    carried = -dot(to_blade(record, blade.basis, carried), air.force)
+    wind = -dot(to_blade(record, blade.basis, to_hub @ bodies.air + blade.gust), air.force)
+    if in_space(flight.air):
+        met, free = air.met, air.free
+        if not in_elements(memory):
+            hinge, slope = gust_along_blade(aircraft, flight.air, record, blade.basis)
+            met = dot(hinge, air.force) + dot(slope, air.moment)
+            hinge, slope = free_gust_along_blade(aircraft, flight.air, record, blade.basis)
+            free = dot(hinge, air.force) + dot(slope, air.moment)
+        carried, wind = carried + (free - met), wind - free
     return (
         air.induced,
         air.wash,
         air.profile,
-        -dot(to_blade(record, blade.basis, carried), air.force),
-        -dot(to_blade(record, blade.basis, to_hub @ bodies.air), air.force),
+        rounded(carried),
+        rounded(wind),
         gravity,
         kinetic,
         hinges.springs,
@@ -373,37 +416,63 @@ class Met(NamedTuple):
 
 
 @kernel
-def inflow_of(aircraft, memory, record, blade):
-    """What blades meet of the inflow."""
+def inflow_of(aircraft, memory, record, own, blade):
+    """What blades with terms `own` meet of the inflow, with the wash of the wake that they shed."""
     induced, gradient = induced_velocity(aircraft, memory, record, blade.pose)
+    at_blades = rounded(gradient)
+    if aircraft.switches[0].unsteady_airfoil == 1:
+        at_blades = at_blades + own.wake_gradient
     wash, wash_gradient = zeros_like(blade.pose.beta), zeros_like(blade.pose.beta)
     if aircraft.switches[0].wash == 1:
         at_hub, slope = velocity_of_inflow(record, blade.pose, wash_of_blade(aircraft, memory, record))
         wash, wash_gradient = rounded(at_hub), rounded(slope)
-    return Met(rounded(induced), rounded(gradient), wash, wash_gradient)
+    return Met(rounded(induced), at_blades, wash, wash_gradient)
 
 
 class AirPowers(NamedTuple):
-    """What the air takes of blades, eq. (5.24) [W], and the force of the air on them, along (y, t, u) [N]."""
+    """What the air takes of blades, eq. (5.24) [W]; Int dF [N] and Int s dF [N m] of it on them, along (y, t, u).
+
+    `met` and `free`: see `sbs_sim.model.section_options.GustPowers`; zero where the air is not sampled at elements.
+    """
 
     induced: Any
     wash: Any
     profile: Any
     force: Any
+    moment: Any
+    met: Any
+    free: Any
 
 
 @kernel
-def air_powers(aircraft, memory, r, blade, inflow):
+def air_powers(aircraft, memory, flight, r, blade, inflow):
     """What the air takes of blades by the forces and the flow of their sections, eq. (5.24)."""
     record, terms, basis = aircraft.blades[r], memory.terms[r], blade.basis
     flow = SectionFlow(terms.u_t_hinge, terms.u_t_slope, terms.u_p_hinge, terms.u_p_slope)
     elements, air = aircraft.elements[record.elements], aircraft.air[0]
     outward = outward_moment = outward_profile = zeros_like(terms.pitch)
-    if aircraft.switches[0].section_options == 1:
+    met = free = zeros_like(terms.pitch)
+    if in_elements(memory):
         along_span = span_flow(record, basis, blade.motion, blade.met, inflow.induced, inflow.gradient)
-        loads, outward, outward_moment = optional_loads(
+        loads, outward, outward_moment, of_gusts = optional_loads(
             *(air, record, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, along_span, terms.pitch),
             inflow.induced - blade.met.z,
+            aircraft.switches[0],
+            separation_of(aircraft, memory, r),
+            element_gusts(memory, record, basis, r),
+        )
+        outward_profile = rounded(along_span.hinge * outward + along_span.slope * outward_moment)
+        met, free = of_gusts.met, of_gusts.free
+    elif aircraft.switches[0].section_options > 0:
+        along_span = span_flow(record, basis, blade.motion, blade.met, inflow.induced, inflow.gradient)
+        if in_space(flight.air):
+            along_span = span_with_gust_gradients(aircraft, flight.air, record, basis, along_span)
+        loads, outward, outward_moment, _ = optional_loads(
+            *(air, record, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, along_span, terms.pitch),
+            inflow.induced - blade.met.z,
+            aircraft.switches[0],
+            separation_of(aircraft, memory, r),
+            None,
         )
         outward_profile = rounded(along_span.hinge * outward + along_span.slope * outward_moment)
     else:
@@ -416,33 +485,49 @@ def air_powers(aircraft, memory, r, blade, inflow):
     outward_root = rounded(record.hinge_offset * outward) + outward_moment
     lift = rounded(cos_flap * loads.normal_force + sin_flap * outward)
     moment = rounded(cos_flap * normal_root + sin_flap * outward_root)
-    force = basis.normal * loads.normal_force + Vector(ZERO, 1.0, ZERO) * loads.forward_force
-    return powers_of(inflow, lift, moment, rounded(-(profile + outward_profile)), force + basis.span * outward)
+    forward = Vector(ZERO, 1.0, ZERO)
+    force = basis.normal * loads.normal_force + forward * loads.forward_force + basis.span * outward
+    arms = basis.normal * loads.normal_moment + forward * loads.forward_moment + basis.span * outward_moment
+    profile = rounded(met - (profile + outward_profile))
+    return powers_of(inflow, lift, moment, profile, force, arms, met, free)
 
 
 @kernel
-def offset_air_powers(aircraft, memory, r, blade, pitching, inflow):
+def offset_air_powers(aircraft, memory, flight, r, blade, pitching, inflow):
     """The same of blades with offsets."""
-    record, basis, pitch = aircraft.blades[r], blade.basis, memory.terms[r].pitch
-    elements, air, rate = aircraft.elements[record.elements], aircraft.air[0], pitching.rate
+    record, basis, pitch, rate = aircraft.blades[r], blade.basis, memory.terms[r].pitch, pitching.rate
     flow = offset_flow(record, basis, blade.motion, rate, blade.met, inflow.induced, inflow.gradient)
-    loads = offset_air_loads(air, record, basis, elements, aircraft.knots[r], aircraft.table, flow, pitch)
+    if in_space(flight.air) and not in_elements(memory):
+        flow = offset_with_gust_gradients(aircraft, flight.air, record, basis, flow)
+    loads = met_by_offsets(aircraft, memory, r, basis, flow, pitch)
     force = loads.load.force
     start, turn = offset_motion(record, blade, to_blade(record, basis, blade.met), rate)
     span_part = basis.span.z * loads.span_moment
     moment = rounded(record.hinge_offset * force.z + (basis.cos_flap * loads.normal_moment + span_part))
     through = rounded(inflow.induced * force.z + inflow.gradient * moment)
     profile = -(dot(force, start) + dot(loads.load.moment, turn)) - through
-    return powers_of(inflow, rounded(force.z), moment, rounded(profile), force)
+    arms = (
+        basis.span * loads.span_moment
+        + Vector(ZERO, 1.0, ZERO) * loads.forward_moment
+        + basis.normal * loads.normal_moment
+    )
+    profile = profile + loads.given
+    if in_space(flight.air) and not in_elements(memory):
+        hinge, slope = gust_along_blade(aircraft, flight.air, record, basis)
+        profile = profile + (dot(hinge, force) + dot(slope, arms))
+    return powers_of(
+        inflow, rounded(force.z), moment, rounded(profile), force, arms, loads.given + 0.0, loads.given_free + 0.0
+    )
 
 
 @kernel
-def powers_of(inflow, lift, moment, profile, force):
+def powers_of(inflow, lift, moment, profile, force, arms, met, free):
     """Powers by the force along the shaft, and by its moment about it."""
     wash = rounded(inflow.wash * lift + inflow.wash_gradient * moment)
     induced = (inflow.induced - inflow.wash) * lift + (inflow.gradient - inflow.wash_gradient) * moment
     force = Vector(rounded(force.x), rounded(force.y), rounded(force.z))
-    return AirPowers(rounded(induced), wash, profile, force)
+    arms = Vector(rounded(arms.x), rounded(arms.y), rounded(arms.z))
+    return AirPowers(rounded(induced), wash, profile, force, arms, met, free)
 
 
 class HingePowers(NamedTuple):
@@ -489,7 +574,8 @@ def add_inflow(aircraft, memory, rates, terms):
         given = rotor.inflow_speed * (
             rotor.radius * x[uniform] * total.thrust + (x[cosine] * total.cosine_moment + x[sine] * total.sine_moment)
         )
-        free = rates_of_inflow(aircraft, memory, j, Inflow(0.0, 0.0, 0.0))
+        none = zeros_like(x[uniform])
+        free = rates_of_inflow(aircraft, memory, j, Inflow(none, none, none))
         scale = aircraft.air[0].density * rotor.momentum_scale * rotor.radius
         mass, inertia = scale * (1.0 / INVERSE_MASS), scale * (1.0 / INVERSE_INERTIA)
         wake = -(mass * x[uniform] * free.uniform + inertia * (x[cosine] * free.cosine + x[sine] * free.sine))
@@ -548,32 +634,36 @@ def add_body(aircraft, memory, bodies, commands, rates, terms):
     terms[WIND] = terms[WIND] - dot(drag, bodies.air)
     surfaces = aircraft.surfaces.shape[0]
     for i in range(surfaces):
-        surface, ramps = aircraft.surfaces[i], aircraft.ramps[i]
-        wash = wash_at(aircraft, memory, surface, ramps)
-        load = surface_load(air.density, surface, ramps, aircraft.shapes, commands, flight.air_velocity, omega, wash)
-        add_load(bodies, load, SURFACES, terms)
+        load = load_of_surface(aircraft, memory, flight, commands, i)
+        add_load(bodies, part_gust(aircraft, flight, i), load, SURFACES, terms)
     for i in range(aircraft.fuselages.shape[0]):
-        fuselage, ramps = aircraft.fuselages[i], aircraft.ramps[surfaces + i]
-        wash = wash_at(aircraft, memory, fuselage, ramps)
-        add_load(
-            bodies,
-            fuselage_load(air.density, fuselage, aircraft.shapes, flight.air_velocity, omega, wash),
-            FUSELAGE,
-            terms,
-        )
+        load = load_of_fuselage(aircraft, memory, flight, i)
+        add_load(bodies, part_gust(aircraft, flight, surfaces + i), load, FUSELAGE, terms)
     for j in range(aircraft.rotors.shape[0]):
-        add_load(bodies, duct_load(aircraft, memory, j), DUCT, terms)
+        gust = zero_vector(flight.velocity.x)
+        if in_space(flight.air):
+            gust = aircraft.rotors[j].axes @ gust_of_rotor(flight.air, j)
+        add_load(bodies, gust, duct_load(aircraft, memory, j), DUCT, terms)
     if aircraft.switches[0].contact == 1:
-        load = contact_load(aircraft.ground[0], aircraft.contacts, memory.state, flight)
+        load = contact_load(aircraft.ground[0], aircraft.contacts, memory, flight)
         terms[CONTACT] = -(dot(load.force, velocity) + dot(load.moment, omega))
 
 
 @kernel
-def add_load(bodies, load, term, terms):
-    """Add what an air load on the body takes, of the motion relative to the air and of that of the air."""
-    taken = dot(load.force, bodies.flight.air_velocity) + dot(load.moment, bodies.flight.omega)
+def part_gust(aircraft, flight, i):
+    """Velocity of the air at a surface or fuselage less that at the c.g., body axes [m/s]."""
+    gust = zero_vector(flight.velocity.x)
+    if in_space(flight.air):
+        gust = gust_of_part(aircraft, flight.air, i)
+    return gust
+
+
+@kernel
+def add_load(bodies, gust, load, term, terms):
+    """Add what an air load on the body takes, of the motion through the air where it acts and of that of the air."""
+    taken = dot(load.force, bodies.flight.air_velocity - gust) + dot(load.moment, bodies.flight.omega)
     terms[term] = terms[term] - taken
-    terms[WIND] = terms[WIND] - dot(load.force, bodies.air)
+    terms[WIND] = terms[WIND] - dot(load.force, bodies.air + gust)
 
 
 @kernel

@@ -12,13 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.model.state import BODY_SIZE, CONTACT_STATES, ROW, UNSEEN_NAMES
+from sbs_sim.model.state import BODY_SIZE, CONTACT_STATES, ROW, UNSEEN_NAMES, WAKE_NAMES
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 LANES, VECTOR, MATRIX, INTEGER = (), (3,), (3, 3), None
 LINE = 64  # bytes of a cache line
 OTHERS, WASH_ROWS = 3, 4  # of `Work.wash`: row of the flow through the disc, and all rows
+NOISE, LOAD, RING_ROWS = range(3)  # of `Work.ring`: rows, and how many there are
 QUAD = 4  # blades that are summed first, see `sbs_sim.lanes.memory`
 
 AIR = {"density": LANES, "gravity": LANES, "plate_areas": VECTOR}
@@ -44,14 +45,18 @@ SWITCHES = {
     "axial_dampers": INTEGER,  # 1 where a rotor has them
     "lag_stops": INTEGER,
     "offsets": INTEGER,  # 1 where quarter chord or mass of a blade are not on the pitch axis
-    "section_options": INTEGER,  # 1 where a rotor has Prandtl's tip loss or oblique drag
+    "section_options": INTEGER,  # 1 where a rotor has oblique drag, 2 where one has Prandtl's tip loss
     "stand": INTEGER,
     "scheduled": INTEGER,  # 1 where shares in swashplate angles change with the airspeed
     "ducts": INTEGER,  # 1 where a rotor has one with a fixed exit
     "teetering": INTEGER,  # 1 where a rotor is
     "wash": INTEGER,  # 1 where something adds to the inflow of a rotor, see `sbs_sim.model.dynamics.set_wash`
+    "unsteady_airfoil": INTEGER,  # 1 where a rotor has one
+    "has_separation": INTEGER,  # 1 where a rotor has late separation
+    "late_stall": INTEGER,  # 1 where it is met, 0 for steady sections
     "ground_effect": INTEGER,  # see `sbs_sim.model.ground_effect`
     "interference": INTEGER,  # 1 where rotors meet the wash of one another
+    "ring": INTEGER,  # 1 where the thrust of a rotor fluctuates in the vortex ring
     "contact": INTEGER,  # 1 for an aircraft that can stand on the ground
 }
 # the ground: a plane
@@ -60,6 +65,7 @@ GROUND = {
     "first": VECTOR,  # unit vectors along it
     "second": VECTOR,
     "depth": LANES,  # of the plane below the origin, along `down`
+    "reach": LANES,  # height of the c.g. from which on no point that could touch it does [m]
 }
 # a point that touches it: see `sbs_sim.model.contact`
 CONTACT = {
@@ -93,6 +99,8 @@ ROTOR = {
     "coefficient_scale": LANES,  # of C_T: 1 / (rho pi R^2 (Omega R)^2), 0 in vacuum
     "inverse_blades": LANES,  # 1 / N_b
     "flap_rest": LANES,  # the coning of a teetering rotor
+    "ring_unsteadiness": LANES,  # standard deviation of the thrust in the vortex ring over its mean
+    "ring_gain": LANES,  # inflow of the blades over the thrust coefficient that it takes, over kappa_i
     "teetering": INTEGER,
     "measured_descent": INTEGER,  # 1 where the inflow in descent is that of measurements
     "duct": INTEGER,  # 1 for a duct with a fixed exit
@@ -105,6 +113,7 @@ ROTOR = {
     "lag": INTEGER,
     "lag_rate": INTEGER,
     "inflow": INTEGER,
+    "wake": INTEGER,  # -1 without an unsteady airfoil
     "drive": INTEGER,  # index of the drive, -1 without one
 }
 BLADE = {
@@ -156,6 +165,17 @@ BLADE = {
     "lead_lag": LANES,  # 1, or 0 where the blade does not lag and for what fills up a quad
     "tip_blades": LANES,  # N_b of a rotor with Prandtl's tip loss, else 0
     "element_width": LANES,  # over R
+    "wake_span": LANES,  # of the section whose circulation follows the flow, from the flap hinge [m]
+    "wake_pitch": LANES,  # its twist, less the angle without lift [rad]
+    "inverse_wake_radius": LANES,  # 1/m
+    "tip_speed": LANES,  # Omega R of the file
+    "inverse_wake_speed": LANES,  # 1 / (Omega R)
+    "inverse_sound_speed": LANES,
+    "wake_slow_share": LANES,  # A_1, A_2 of the indicial function; 0 without an unsteady airfoil
+    "wake_fast_share": LANES,
+    "wake_slow_rate": LANES,  # 2 b_1 / c, 2 b_2 / c [1/m]; 0 also for what fills up a quad
+    "wake_fast_rate": LANES,
+    "late_stall": LANES,  # 1 for late separation
     "oblique_drag": LANES,  # 1 for drag along the local flow, the one along the span included
     "first_alpha": LANES,  # of the airfoil table [rad]
     "inverse_alpha_step": LANES,
@@ -166,6 +186,8 @@ BLADE = {
     "starts_quad": INTEGER,  # 1 for the first of a quad, 0 for those that follow it
     "elements": INTEGER,
     "harmonics": INTEGER,
+    "separation_first": INTEGER,  # row of the first section among those of `Work.separation`
+    "separation_stride": INTEGER,  # rows from a section to the next
 }
 DRIVE = {
     "speed": LANES,  # of the first rotor in the file [rad/s]
@@ -219,6 +241,7 @@ ELEMENT = {
     "first_row": LANES,  # of the airfoil table
     "airfoil": LANES,  # number of the airfoil from the root outwards
     "number_scale": LANES,  # of the airfoil table over the airspeed: c / nu of Reynolds numbers, 1 / a of Mach numbers
+    "separation_rate": LANES,  # of the lag of separation over the airspeed [1/m]
     "offset_along": LANES,  # of the quarter chord from the pitch axis at zero pitch, and normal to it
     "offset_up": LANES,
     "cos_sweep": LANES,
@@ -298,6 +321,9 @@ TERMS = {
     "u_p_slope": LANES,
     "pitch": LANES,
     "outward_force": LANES,  # along the span, of oblique drag
+    "wake_gradient": LANES,  # of the wash of the wake along the radius [1/s]
+    "slow_rate": LANES,  # of the parts of the circulation
+    "fast_rate": LANES,
 }
 # of a blade with offsets, beside TERMS, see `sbs_sim.model.offset`; c_beta, Q_beta and A_1 are without what lag takes
 PITCHING = {
@@ -368,6 +394,8 @@ class StateIndices(NamedTuple):
         rotor does not have point to the zero behind the state.
     inflow : ndarray of int64, shape (3, quads)
         In the order of `sbs_sim.model.state.INFLOW_NAMES`.
+    wake_slow, wake_fast : ndarray of int64, shape (coordinates, quads)
+        As those of flap.
     gust : ndarray of int64, shape (9, quads)
         Among the rows of the air, see `sbs_sim.model.air`.
     """
@@ -379,6 +407,8 @@ class StateIndices(NamedTuple):
     lag: IntArray
     lag_rate: IntArray
     inflow: IntArray
+    wake_slow: IntArray
+    wake_fast: IntArray
     gust: IntArray
 
 
@@ -481,12 +511,23 @@ class Work(NamedTuple):
         What others add to the inflow of each rotor, as a part of it: uniform, sine and cosine part for its blades, over
         kappa_i Omega R, in the order of `sbs_sim.model.state.INFLOW_NAMES`; and what other rotors add to the flow
         through its disc, over Omega R. Of an aircraft without such, empty.
+    ring : ndarray, shape (2, n_rotors, n)
+        Noise of each rotor's vortex ring, zero but in a flight, and what it takes of the thrust coefficient. Of an
+        aircraft whose thrust does not fluctuate, empty.
+    contact : ndarray, shape (2, n_points, n)
+        Rates of the deflections of what touches the ground [m/s].
     commands : ndarray, shape (3 n_rows, n)
         Swashplate angles at the present airspeed, where they change with it; else empty.
     pitching : structured ndarray, shape (registers,)
         Of blades with offsets, else empty.
     pitch_sums : structured ndarray, shape (quads,)
         Of such blades that a drive turns, else empty.
+    separation, separation_rates : ndarray, shape (rows, width)
+        Attached shares of the chord of sections with late separation, and their rates [1/s]; else empty.
+    separation_states, separation_state_rates : ndarray, shape (separations, n)
+        The same memory.
+    gusts : ndarray, shape (registers, elements, 3, width)
+        `Space.elements`.
     """
 
     state: Array
@@ -510,17 +551,34 @@ class Work(NamedTuple):
     coning: NDArray[Any]
     coning_change: Array
     wash: Array
+    ring: Array
+    contact: Array
     commands: Array
     pitching: NDArray[Any]
     pitch_sums: NDArray[Any]
+    separation: Array
+    separation_rates: Array
+    separation_states: Array
+    separation_state_rates: Array
+    gusts: Array
+
+
+def separation_count(model: Model) -> int:
+    """Sections with room for late separation: those of all blades, in eights of two quads; 0 where no rotor has it."""
+    if not model.switches["has_separation"][0]:
+        return 0
+    quads = int(sum(-(-int(blades) // QUAD) for blades in model.rotors["blades"]))
+    return -(-quads // 2) * 2 * QUAD * model.elements.shape[1]
 
 
 def state_size(model: Model) -> int:
-    """Numbers in the state of one aircraft: of the body, of flap, lag and their rates, inflow, drives, contact."""
+    """Numbers in the state of one aircraft: of body, flap, lag and their rates, inflow, wakes, drives, contact."""
     drives = sum(int((model.drives[name] >= 0).sum()) for name in ("speed_index", "torque_index", "governor_index"))
     unseen = len(UNSEEN_NAMES) * len(model.drives)
     contacts = CONTACT_STATES * len(model.contacts)
-    return BODY_SIZE + int(4 * model.rotors["blades"].sum() + 3 * len(model.rotors)) + drives + unseen + contacts
+    wakes = len(WAKE_NAMES) * int(model.rotors["blades"][model.rotors["wake"] >= 0].sum())
+    rotors = int(4 * model.rotors["blades"].sum() + 3 * len(model.rotors)) + wakes
+    return BODY_SIZE + rotors + drives + unseen + contacts + separation_count(model)
 
 
 def make_work(model: Model) -> Work:
@@ -532,6 +590,7 @@ def make_work(model: Model) -> Work:
     acceleration_rows = aligned((6, n), float)
     load_rows = aligned((LOAD_SIZE * len(rotors), n), float)
     turning = len(model.drives) > 0
+    separations = aligned((separation_count(model), n), float), aligned((separation_count(model), n), float)
     teetering, offsets = (bool(model.switches[name][0]) for name in ("teetering", "offsets"))
     return Work(
         state=aligned((size + 1, n), float),
@@ -555,9 +614,16 @@ def make_work(model: Model) -> Work:
         coning=records(CONING, quads if teetering else 0, n),
         coning_change=aligned((len(rotors) if teetering else 0, n), float),
         wash=aligned((WASH_ROWS, len(rotors) if model.switches["wash"][0] else 0, n), float),
+        ring=aligned((RING_ROWS, len(rotors) if model.switches["ring"][0] else 0, n), float),
+        contact=aligned((CONTACT_STATES, len(model.contacts), n), float),
         commands=aligned((_command_count(model), n), float),
         pitching=records(PITCHING, len(model.blades) if offsets else 0, width),
         pitch_sums=records(PITCH_SUMS, quads if offsets and turning else 0, n),
+        separation=separations[0].reshape(-1, width),
+        separation_rates=separations[1].reshape(-1, width),
+        separation_states=separations[0],
+        separation_state_rates=separations[1],
+        gusts=aligned((0, 0, 3, width), float),
     )
 
 
@@ -676,23 +742,40 @@ class Space(NamedTuple):
     Attributes
     ----------
     parameters : ndarray, shape (SPACE_SIZE, n)
-    grids : ndarray, shape (m, SIDE, SIDE, 3)
+    grids : ndarray, shape (m, SIDE + BESIDE, SIDE + BESIDE, 4)
         Turbulence, see `sbs_sim.model.air_field`; each flight has some of them, in order.
     tables : ndarray, shape (m, 4)
         Own gusts: distance [m], and velocity there, NED [m/s]; each flight has some rows of them.
     sites : ndarray, shape (rows, n)
-        Memory: where hubs and parts are, and how the hubs' axes lie, NED.
+        Memory: where hubs and parts are, and how the hubs' axes lie, NED; behind them the c.g., zeros, and the velocity
+        of its air [m/s].
+    found : ndarray, shape (FOUND + WEIGHTS, 4)
+        Memory: velocity and derivatives at a point, and what `sbs_sim.model.air_field` weighs those around it by.
+    elements : ndarray, shape (registers, elements, 3, width)
+        Memory: where blade elements are, NED, and then their air, see `sbs_sim.model.air_rows.ElementGusts`. Empty
+        where the air is not sampled there.
+    flights : ndarray of int64, shape (registers, width)
+        Number of the flight that a blade belongs to; -1 for what fills up a quad.
+    state, azimuths : ndarray, shapes (size + 1, n), (n_rotors, n)
+        Memory: state with a zero behind it, azimuths of the rotors [rad].
     """
 
     parameters: Array
     grids: Array
     tables: Array
     sites: Array
+    found: Array
+    elements: Array
+    flights: IntArray
+    state: Array
+    azimuths: Array
 
 
 def no_space(n: int) -> Space:
     """Air that is the same everywhere, of n flights."""
-    return Space(aligned((0, n), float), np.zeros((0, 1, 1, 3)), np.zeros((0, 4)), aligned((0, n), float))
+    nothing, none = aligned((0, n), float), np.zeros((0, 4))
+    elements, flights = np.zeros((0, 0, 3, n)), np.zeros((0, n), dtype=np.int64)
+    return Space(nothing, none.reshape(0, 1, 1, 4), none, nothing, none, elements, flights, nothing, nothing)
 
 
 class Tick(NamedTuple):

@@ -26,6 +26,13 @@ class SectionFlow(NamedTuple):
     u_p_slope: Any
 
 
+class SpanFlow(NamedTuple):
+    """Velocity of the sections along the span, outwards, linear along it: u_R = hinge + slope s [m/s, 1/s]."""
+
+    hinge: Any
+    slope: Any
+
+
 class AirLoads(NamedTuple):
     """Sums along a blade, section 4.3.
 

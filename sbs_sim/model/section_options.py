@@ -8,24 +8,25 @@ Helicopter Theory, section 5-12.
 import math
 from typing import Any, NamedTuple
 
-from sbs_sim.lanes import cross, dot, minimum, rounded, select, sqrt, table_row, zeros_like
+from sbs_sim.lanes import Vector, any_lane, cross, dot, minimum, rounded, select, sqrt, table_row, zeros_like
 from sbs_sim.model.blade import to_blade
+from sbs_sim.model.element_gusts import free_gust_at, gust_at
 from sbs_sim.model.kernel import kernel
-from sbs_sim.model.section import DEGREE, AirLoads, find_section
-from sbs_sim.model.trigonometry import TINY, angle_of
+from sbs_sim.model.section import DEGREE, AirLoads, SectionFlow, SpanFlow, find_section
+from sbs_sim.model.separation import late_lift
+from sbs_sim.model.trigonometry import QUARTER_TURN, TINY, angle_of, small_arcsine
 
 GAUSS = 0.5 / math.sqrt(3.0)  # of an element from its middle: points of the mean with two values
 QUARTER_CIRCLE = 2.0 / math.pi  # over it
+SINE_EIGHTH = 0.38  # less than sin 22.5 deg
 DEEP = 40.0  # exponent whose decay is below the last bit
+NO_LOSS = 1000.0  # over an element of a rotor without this loss
+NEAR_TIP, FAR_INBOARD = 0.05, 1e-3  # decays up to which four terms of the series are enough, and one
+SERIES = (1.0 / 6.0, 3.0 / 40.0, 5.0 / 112.0, 35.0 / 1152.0)  # of z^3 .. z^9 of the arcsine
+INVERSE_PI = 1.0 / math.pi
+NO_TIP_LOSS, TIP_LOSS = 1, 2  # of the switch `section_options`
 HALVINGS, TERMS = 6, 14
 FACTORS = tuple((-1.0) ** k / math.factorial(k) for k in range(TERMS + 1))
-
-
-class SpanFlow(NamedTuple):
-    """Velocity of the sections along the span, outwards, linear along it: u_R = hinge + slope s [m/s, 1/s]."""
-
-    hinge: Any
-    slope: Any
 
 
 @kernel
@@ -37,7 +38,7 @@ def span_flow(blade, basis, motion, hub_velocity, induced, gradient):
     up = basis.span.z
     return SpanFlow(
         dot(basis.span, hinge) + up * (induced + blade.hinge_offset * gradient),
-        up * gradient,
+        rounded(up * gradient),
     )
 
 
@@ -55,8 +56,33 @@ def decay(x):
 
 @kernel
 def prandtl(e):
-    """Prandtl's factor (2 / pi) arccos e of a decay e = e^-f."""
-    return QUARTER_CIRCLE * angle_of(sqrt((1.0 - e) * (1.0 + e)), e, 1.0)
+    """Prandtl's factor (2 / pi) arccos e of a decay e = e^-f.
+
+    Inboard, where no tip vortex is near, that is quick, and gives the same bits.
+    """
+    if any_lane(e > SINE_EIGHTH):
+        return QUARTER_CIRCLE * angle_of(sqrt((1.0 - e) * (1.0 + e)), e, 1.0)
+    return QUARTER_CIRCLE * (QUARTER_TURN - small_arcsine(e))
+
+
+@kernel
+def mean_factor(outer, inner):
+    """Mean of Prandtl's factor at two decays, the outer one not below the inner.
+
+    Where both are small, which is nearly everywhere, by the series of the arcsine: what it leaves out is below the
+    last bit.
+    """
+    if any_lane(outer > NEAR_TIP):
+        return rounded(0.5 * (prandtl(outer) + prandtl(inner)))
+    p, q = outer * outer + 0.0, inner * inner + 0.0
+    first, second = rounded(outer * p), rounded(inner * q)
+    if any_lane(outer > FAR_INBOARD):
+        outer_share = SERIES[0] + p * (SERIES[1] + p * (SERIES[2] + p * SERIES[3]))
+        inner_share = SERIES[0] + q * (SERIES[1] + q * (SERIES[2] + q * SERIES[3]))
+        beyond = first * outer_share + second * inner_share
+    else:
+        beyond = rounded(SERIES[0] * (first + second))
+    return 1.0 - INVERSE_PI * ((outer + inner) + beyond)
 
 
 @kernel
@@ -67,18 +93,40 @@ def set_tip_factors(blade, strip, through):
     """
     tip = blade.rotor_speed * blade.radius
     rate = 0.5 * blade.tip_blades * sqrt(tip * tip + through * through) / (abs(through) + TINY)
-    over_element = rate * blade.element_width
+    over_element = select(blade.tip_blades > 0.0, rate * blade.element_width, NO_LOSS)
     outer, inner = decay(over_element * (0.5 - GAUSS)), decay(over_element * (0.5 + GAUSS))
     step = decay(over_element)
     for k in range(strip.shape[0]):
-        section = strip[strip.shape[0] - 1 - k]
-        mean = 0.5 * (prandtl(outer) + prandtl(inner))
-        section.tip_factor = select(blade.tip_blades > 0.0, mean, 1.0)
+        strip[strip.shape[0] - 1 - k].tip_factor = mean_factor(outer, inner)
         outer, inner = outer * step + 0.0, inner * step + 0.0
 
 
+class GustPowers(NamedTuple):
+    """Forces on elements times the velocity of the air there less that at the hub [W]: within a duct, and without."""
+
+    met: Any
+    free: Any
+
+
 @kernel
-def optional_loads(air, blade, elements, knots, table, strip, flow, along, pitch, through):
+def flow_at(flow, gusts, i):
+    """Flow of blades as an element meets it."""
+    if gusts is None:
+        return flow
+    gust = gust_at(gusts, i)
+    return SectionFlow(flow.u_t_hinge - gust.y, flow.u_t_slope, flow.u_p_hinge - gust.z, flow.u_p_slope)
+
+
+@kernel
+def along_at(blade, along, gusts, i, s):
+    """Velocity of an element along the span that its drag feels [m/s]; `along` is that without gusts."""
+    if gusts is None:
+        return along.hinge + along.slope * s
+    return (along.hinge + along.slope * s) - blade.oblique_drag * gust_at(gusts, i).x
+
+
+@kernel
+def optional_loads(air, blade, elements, knots, table, strip, flow, along, pitch, through, switches, separation, gusts):
     """Air loads of blades as those of `sbs_sim.model.section.section_loads`; Int dF and Int s dF along the span.
 
     Parameters
@@ -86,21 +134,37 @@ def optional_loads(air, blade, elements, knots, table, strip, flow, along, pitch
     along : SpanFlow
     through : lanes
         Flow through the disc [m/s].
+    switches : record SWITCHES
+    separation : Separation
+    gusts : ElementGusts or None
+        What the air at the elements differs by from that at the hub.
     """
-    set_tip_factors(blade, strip, through)
+    if switches.section_options == TIP_LOSS:
+        set_tip_factors(blade, strip, through)
+    else:
+        for i in range(elements.shape[0]):
+            strip[i].tip_factor = zeros_like(pitch) + 1.0
     for i in range(elements.shape[0]):
-        find_section(blade, elements[i], knots, strip[i], flow, pitch)
+        find_section(blade, elements[i], knots, strip[i], flow_at(flow, gusts, i), pitch)
+    felt = SpanFlow(rounded(blade.oblique_drag * along.hinge), rounded(blade.oblique_drag * along.slope))
     normal_force = forward_force = normal_moment = forward_moment = zeros_like(pitch)
-    outward_force = outward_moment = zeros_like(pitch)
+    outward_force = outward_moment = given = given_free = zeros_like(pitch)
     for i in range(elements.shape[0]):
         element, section = elements[i], strip[i]
         s = element.span
-        u_t, u_p = flow.u_t_hinge + flow.u_t_slope * s, flow.u_p_hinge + flow.u_p_slope * s
-        u_r = blade.oblique_drag * (along.hinge + along.slope * s)
+        own = flow_at(flow, gusts, i)
+        u_t, u_p = own.u_t_hinge + own.u_t_slope * s, own.u_p_hinge + own.u_p_slope * s
+        u_r = along_at(blade, felt, gusts, i, s)
         lift, lift_slope, drag, drag_slope = table_row(table, section.row, section.fraction, DEGREE)
         pressure = air.density * element.half_area
         share = section.tip_factor * element.lift_factor
-        lift_gain = (lift + lift_slope * section.number) * (pressure * section.airspeed * share)
+        coefficient = lift + lift_slope * section.number
+        if switches.late_stall == 1:
+            alpha = pitch + element.twist - angle_of(u_p, u_t, 1.0 / section.airspeed)
+            coefficient = coefficient + late_lift(
+                blade, element, separation, i, section.number, section.airspeed, alpha, coefficient
+            )
+        lift_gain = coefficient * (pressure * section.airspeed * share)
         speed = sqrt(section.airspeed * section.airspeed + u_r * u_r)
         drag_gain = (drag + drag_slope * section.number) * (pressure * speed)
         up = lift_gain * u_t - drag_gain * u_p
@@ -109,4 +173,9 @@ def optional_loads(air, blade, elements, knots, table, strip, flow, along, pitch
         normal_moment, forward_moment = normal_moment + s * up, forward_moment - s * rearward
         outward_force = outward_force - drag_gain * u_r
         outward_moment = outward_moment - s * rounded(drag_gain * u_r)
-    return AirLoads(normal_force, forward_force, normal_moment, forward_moment), outward_force, outward_moment
+        if gusts is not None:
+            load = Vector(-rounded(drag_gain * u_r), -rearward, up)
+            given = given + dot(load, gust_at(gusts, i))
+            given_free = given_free + dot(load, free_gust_at(gusts, i))
+    loads = AirLoads(normal_force, forward_force, normal_moment, forward_moment)
+    return loads, outward_force, outward_moment, GustPowers(given, given_free)

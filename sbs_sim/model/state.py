@@ -11,13 +11,17 @@ linear state, 8 + 4 n_blades + 3 n_rotors values (38 for two three-bladed rotors
 
 Flap and lag are multiblade coordinates (theory.md section 1), inflow is lambda0, lambdas, lambdac per rotor.
 
+Behind the inflow of all rotors follow, of each rotor with an unsteady airfoil, the multiblade coordinates of the slow
+and of the fast part of its blades' circulation (theory.md section 4.9), in both states.
+
 Drives stand behind all that (theory.md section 7.6): of each the speed of its first rotor (rad/s), with an engine its
 torque (N m), with a governor the integral part of its throttle. Behind these, and not in the linear state, follow of
 each drive the azimuth of its first rotor (rad), the share of the battery that is used up, and the share of the engine
 that has failed.
 
-Last are, of an aircraft that can stand on the ground, the deflections of each of its contact points along the ground
-(m), which the linear state does not have either.
+Behind these are, of an aircraft that can stand on the ground, the deflections of each of its contact points along the
+ground (m), which the linear state does not have either. Last are, of an aircraft with late separation, the attached
+shares of the chord of all sections (theory.md section 4.10), likewise.
 """
 
 import re
@@ -49,6 +53,7 @@ SWASHPLATE_NAMES = ("collective", "lateral_cyclic", "longitudinal_cyclic")
 COLLECTIVE, LATERAL, LONGITUDINAL = range(3)  # of SWASHPLATE_NAMES
 INFLOW_NAMES = ("lambda0", "lambdas", "lambdac")
 UNIFORM, SINE, COSINE = range(3)  # of INFLOW_NAMES
+WAKE_NAMES = ("wake_slow", "wake_fast")  # parts of the circulation that follow the flow
 SPEED, ENGINE_TORQUE, GOVERNOR = DRIVE_NAMES = ("Omega", "engine_torque", "governor")
 DRIVE_UNITS = {SPEED: "rad/s", ENGINE_TORQUE: "N m", GOVERNOR: "1"}
 UNSEEN_NAMES = ("azimuth", "discharge", "engine_failure")  # of a drive, and not in the linear state
@@ -62,6 +67,7 @@ ROW = len(SWASHPLATE_NAMES)  # numbers in a row of commands: a swashplate's, or 
 _ROTOR_STATE = re.compile(
     r"(?P<rate>d?)(?:[ab](?P<flap>\d+|d)|xi(?P<lag>0|d|\d*[cs]))\((?P<rotor>\d+)\)"
     r"|lambda(?P<inflow>[0sc])\((?P<inflow_rotor>\d+)\)"
+    r"|wake_(slow|fast)(?P<wake>0|d|\d*[cs])\((?P<wake_rotor>\d+)\)"
     r"|(?P<drive>Omega|engine_torque|governor)\(\d+\)"
 )
 
@@ -98,7 +104,7 @@ class Part:
     Attributes
     ----------
     family : str
-        "body", "flap", "lag", "inflow" or "drive".
+        "body", "flap", "lag", "inflow", "wake" or "drive".
     harmonic : int
         0 for body states and collective coordinates, n for the nth harmonic, -1 for the differential coordinate.
     rotor : int
@@ -134,13 +140,20 @@ def part_of(name: str) -> Part:
         raise ValueError(f"no linear state is called {name!r}")
     if match["drive"]:
         return Part("drive", 0, -1)
-    rotor = int(match["rotor"] or match["inflow_rotor"]) - 1
+    rotor = int(match["rotor"] or match["inflow_rotor"] or match["wake_rotor"]) - 1
     if match["inflow"]:
         return Part("inflow", 0 if match["inflow"] == "0" else 1, rotor)
+    if match["wake"]:
+        return Part("wake", _harmonic(match["wake"]), rotor)
     if match["lag"]:
-        digits = match["lag"].rstrip("cs") or "1"
-        return Part("lag", -1 if digits == "d" else int(digits), rotor, bool(match["rate"]))
+        return Part("lag", _harmonic(match["lag"]), rotor, bool(match["rate"]))
     return Part("flap", -1 if match["flap"] == "d" else int(match["flap"]), rotor, bool(match["rate"]))
+
+
+def _harmonic(suffix: str) -> int:
+    """Harmonic of a coordinate with one of the names of `multiblade_suffixes`, -1 for the differential one."""
+    digits = suffix.rstrip("cs") or "1"
+    return -1 if digits == "d" else int(digits)
 
 
 @dataclass(frozen=True)
@@ -155,11 +168,17 @@ class StateLayout:
         Of each drive those of `DRIVE_NAMES` that it has.
     contacts : int
         Number of points that can touch the ground.
+    wakes : tuple of bool
+        Which rotors have an unsteady airfoil; none if empty.
+    separations : int
+        Sections whose separation is a state.
     """
 
     blades: tuple[int, ...]
     drives: tuple[tuple[str, ...], ...] = ()
     contacts: int = 0
+    wakes: tuple[bool, ...] = ()
+    separations: int = 0
 
     @cached_property
     def blade_count(self) -> int:
@@ -169,6 +188,11 @@ class StateLayout:
     @cached_property
     def size(self) -> int:
         """Length of the simulation state."""
+        return self.separations_start + self.separations
+
+    @cached_property
+    def separations_start(self) -> int:
+        """Index of the first attached share of the chord of a section."""
         return self.contacts_start + CONTACT_STATES * self.contacts
 
     @cached_property
@@ -179,7 +203,7 @@ class StateLayout:
     @cached_property
     def drives_start(self) -> int:
         """Index of the first state of the drives: the length of the state without them."""
-        return BODY_SIZE + 4 * self.blade_count + 3 * len(self.blades)
+        return self._wakes_start + self._wakes_before(len(self.blades))
 
     @cached_property
     def linear_size(self) -> int:
@@ -211,6 +235,26 @@ class StateLayout:
         first = BODY_SIZE + 4 * self.blade_count + 3 * rotor
         return slice(first, first + 3)
 
+    @property
+    def _wakes_start(self) -> int:
+        return BODY_SIZE + 4 * self.blade_count + 3 * len(self.blades)
+
+    def _wakes_before(self, rotor: int) -> int:
+        return len(WAKE_NAMES) * sum(
+            blades for blades, has_wake in zip(self.blades[:rotor], self.wakes, strict=False) if has_wake
+        )
+
+    def wake(self, rotor: int) -> slice:
+        """Indices of one rotor's parts of the circulation over the tip speed: slow, then fast; empty without them."""
+        first = self._wakes_start + self._wakes_before(rotor)
+        return slice(first, self._wakes_start + self._wakes_before(rotor + 1))
+
+    def wake_pairs(self, rotor: int) -> list[tuple[int, int]]:
+        """Indices of the slow and the fast part of each multiblade coordinate of `wake`."""
+        own = self.wake(rotor)
+        middle = (own.start + own.stop) // 2
+        return list(zip(range(own.start, middle), range(middle, own.stop), strict=True))
+
     def drive(self, drive: int) -> dict[str, int]:
         """Indices of one drive's states in the simulation state, by the names that they have without the number."""
         first = self.drives_start + sum(map(len, self.drives[:drive]))
@@ -229,6 +273,7 @@ class StateLayout:
         body = ("north", "east", "down", "qw", "qx", "qy", "qz", "u", "v", "w", "p", "q", "r")
         unseen = [f"{name}({i + 1})" for i in range(len(self.drives)) for name in UNSEEN_NAMES]
         unseen += [f"{name}({i + 1})" for i in range(self.contacts) for name in CONTACT_NAMES]
+        unseen += [f"attached_share({i + 1})" for i in range(self.separations)]
         return body + self._rotor_names + self._drive_names + tuple(unseen)
 
     @cached_property
@@ -245,7 +290,8 @@ class StateLayout:
         """Units of the linear state."""
         angles, rates = ("rad",) * self.blade_count, ("rad/s",) * self.blade_count
         drives = tuple(DRIVE_UNITS[name] for names in self.drives for name in names)
-        return LINEAR_BODY_UNITS + angles + rates + angles + rates + ("1",) * (3 * len(self.blades)) + drives
+        ratios = ("1",) * (self.drives_start - self.inflow(0).start)
+        return LINEAR_BODY_UNITS + angles + rates + angles + rates + ratios + drives
 
     @cached_property
     def linear_owners(self) -> NDArray[np.int64]:
@@ -274,6 +320,13 @@ class StateLayout:
                 for suffix in multiblade_suffixes(blades)
             ]
         names += [f"{name}({rotor + 1})" for rotor in range(len(self.blades)) for name in INFLOW_NAMES]
+        names += [
+            f"{name}{suffix}({rotor + 1})"
+            for rotor, has_wake in enumerate(self.wakes)
+            if has_wake
+            for name in WAKE_NAMES
+            for suffix in multiblade_suffixes(self.blades[rotor])
+        ]
         return tuple(names)
 
     def to_linear(self, state: Array) -> Array:

@@ -38,6 +38,7 @@ from sbs_sim.model.wind_columns import (
 Array = NDArray[np.float64]
 
 BLOCK = 10_000  # ticks by which turbulence is advanced at once
+MIN_TURBULENCE_AIRSPEED = 1.0  # m/s, at which a frozen field passes where there is neither wind nor flight
 MAX_WIND = 100.0  # m/s; the strongest wind measured at the ground is 113 m/s
 RANGES = {
     "gust_delay": (0.0, 1e6, "s"),
@@ -55,10 +56,11 @@ RANGES = {
     "roughness_length": (1e-6, 10.0, "m"),
     "profile_exponent": (0.0, 1.0, ""),
 }
-POINT, RATES, FIELD = "point", "rates", "field"
+POINT, RATES, FIELD, ELEMENTS = "point", "rates", "field", "elements"
+FIELDS = (FIELD, ELEMENTS)
 CHOICES = {
     "turbulence_model": (DRYDEN, VON_KARMAN),
-    "turbulence_extent": (POINT, RATES, FIELD),
+    "turbulence_extent": (POINT, RATES, FIELD, ELEMENTS),
     "gust_shape": ("one_minus_cosine", "ramp"),
     "wind_profile": ("uniform", "logarithmic", "power"),
 }
@@ -125,7 +127,7 @@ class Wind:
     turbulence_direction : float
         Heading of the longitudinal component, from north to east [rad].
     turbulence_seed : int
-        Seed of the noise: equal seeds give equal turbulence.
+        Seed of the noise: equal seeds give equal turbulence, and equal fluctuations of the thrust in vortex rings.
     turbulence_model : str
         "dryden" or "von_karman".
     turbulence_lateral_length, turbulence_vertical_length : float
@@ -134,7 +136,8 @@ class Wind:
         "point": turbulence is the same everywhere on the aircraft. "rates": the air also turns, with p_g, q_g and r_g
         of MIL-F-8785C. "field": turbulence is a frozen field over the horizontal plane that drifts with the steady
         wind; each rotor, surface and fuselage meets it where it is, and each disc its gradients. The speed of passing
-        and its direction are then those of the flight itself.
+        and its direction are then those of the flight itself. "elements": the same, and each blade element meets that
+        field, and any other air that is not the same everywhere, where it is; it takes several times as long.
     turbulence_span : float
         Span b of the rates [m].
     gust_shape : str
@@ -240,18 +243,18 @@ class Wind:
                 raise SimulationError(f"{name} = {value:g}: allowed are {allowed}")
         if self.turbulence_extent == RATES and not self.turbulence_span > 0.0:
             raise SimulationError("turbulence_span = 0: allowed is a span above 0 with turbulence_extent = 'rates'")
-        if self.turbulence_extent == FIELD:
+        if self.turbulence_extent in FIELDS:
             along, across, _ = self.turbulence_intensity
             if along != across:
                 raise SimulationError(
                     f"turbulence_intensity.y = {across:g}: allowed is {along:g} m/s, that of x, with"
-                    " turbulence_extent = 'field', which is isotropic in the plane"
+                    f" turbulence_extent = {self.turbulence_extent!r}, which is isotropic in the plane"
                 )
             length, lateral, _ = self.turbulence_lengths
             if length != lateral:
                 raise SimulationError(
                     f"turbulence_lateral_length = {lateral:g}: allowed is {length:g} m, turbulence_length, with"
-                    " turbulence_extent = 'field', which is isotropic in the plane"
+                    f" turbulence_extent = {self.turbulence_extent!r}, which is isotropic in the plane"
                 )
 
     @property
@@ -319,7 +322,7 @@ class WindField:
         self._array[GUST_DURATION] = wind.gust_duration
         self._turbulence = self._filtered = None
         self._own = wind.own_gust if wind.own_gust is not None and wind.own_gust.over == TIME else None
-        if any(wind.turbulence_intensity) and wind.turbulence_extent != FIELD:
+        if any(wind.turbulence_intensity) and wind.turbulence_extent not in FIELDS:
             alike = len(set(wind.turbulence_lengths)) == 1
             if alike and wind.turbulence_model == DRYDEN and wind.turbulence_extent == POINT:
                 self._turbulence = DrydenTurbulence(wind, tick)
@@ -381,7 +384,7 @@ def _filtered_turbulence(wind: Wind, tick: float) -> FilteredTurbulence:
 
 def field_of(wind: Wind) -> tuple[Array, float] | None:
     """Levels of the field of a wind and its period, see `field_grids`; None where it has no field."""
-    if wind.turbulence_extent != FIELD or not any(wind.turbulence_intensity):
+    if wind.turbulence_extent not in FIELDS or not any(wind.turbulence_intensity):
         return None
     length, _, vertical = wind.turbulence_lengths
     return field_grids(wind.turbulence_model, length, vertical, wind.turbulence_seed)
@@ -392,12 +395,13 @@ def _space(wind: Wind, start: float, ground: float) -> Space:
     values = np.zeros(air.SPACE_SIZE)
     values[air.START] = start
     values[air.DRIFT : air.DRIFT + 3] = wind.velocity
-    grids = np.zeros((0, 1, 1, 3))
+    grids = np.zeros((0, 1, 1, 4))
     field = field_of(wind)
     if field is not None:
         grids, values[air.PERIOD] = field
         values[air.GRIDS] = len(grids)
         values[air.HORIZONTAL], values[air.VERTICAL] = wind.turbulence_intensity[0], wind.turbulence_intensity[2]
+    values[air.ELEMENTS] = wind.turbulence_extent == ELEMENTS
     values[air.PROFILE] = CHOICES["wind_profile"].index(wind.wind_profile)
     values[air.GROUND], values[air.REFERENCE_HEIGHT] = ground, wind.reference_height
     values[air.SHAPE] = wind.roughness_length if wind.wind_profile == "logarithmic" else wind.profile_exponent

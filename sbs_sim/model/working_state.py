@@ -6,7 +6,6 @@ from sbs_sim.lanes import (
     as_lanes,
     dot,
     maximum,
-    minimum,
     select,
     sqrt,
     transposed,
@@ -18,11 +17,12 @@ from sbs_sim.model.frames import rotation
 from sbs_sim.model.ground_effect import ground_height
 from sbs_sim.model.kernel import entry, kernel
 from sbs_sim.model.records import OTHERS
+from sbs_sim.model.separation import interpolated
 from sbs_sim.model.trigonometry import TINY, angle_of, inverse_root
 
 # columns of a rotor's row
-ADVANCE_RATIO, HOVER_INFLOW, DESCENT, FLOW, STALLED, REVERSED, OUTSIDE, HEIGHT = range(8)
-WORKING_SIZE = 8
+ADVANCE_RATIO, HOVER_INFLOW, DESCENT, FLOW, STALLED, REVERSED, OUTSIDE, HEIGHT, BEHIND = range(9)
+WORKING_SIZE = 9
 
 # rows of the stall angles
 NUMBER, HIGHEST, LOWEST, LEAST, MOST = range(5)
@@ -42,7 +42,8 @@ def working_state(model, work, out):
         the thrust and flow through the disc with it, both over the tip speed; shares of the disc, between flap hinge
         and tip, where sections are stalled, where the flow comes from behind, and where the Reynolds or Mach number
         is outside of the airfoil's table, as the blades meet it now; height of the hub above the ground over the
-        radius.
+        radius; how far the hub is behind that of another rotor whose wake is swept back over it, over the radius of
+        that, 0 where there is none.
     """
     aircraft, memory = in_lanes(model), memory_in_lanes(work)
     angles, rows = as_lanes(model.stall, aircraft.blades), as_lanes(out, aircraft.rotors)
@@ -70,7 +71,26 @@ def working_state(model, work, out):
             own = memory.hubs[quad]
             found, area = found + own.force, area + own.moment.x
         row[HEIGHT] = ground_height(ground, rotor, position, down)
+        row[BEHIND] = zeros_like(scale)
         row[STALLED], row[REVERSED], row[OUTSIDE] = found.x / area, found.y / area, found.z / area
+    for k in range(aircraft.pairs.shape[0]):
+        row = rows[aircraft.pairs[k].target]
+        row[BEHIND] = maximum(row[BEHIND], behind(aircraft, memory, aircraft.pairs[k]))
+
+
+@kernel
+def behind(aircraft, memory, pair):
+    """How far the hub of a pair's target is behind that of its source, whose wake goes aft more than down."""
+    source, target = aircraft.rotors[pair.source], aircraft.rotors[pair.target]
+    flow = memory.flow[pair.source].velocity
+    offset = transposed(source.axes) @ (target.hub - source.hub)
+    speed = sqrt(flow.x * flow.x + flow.y * flow.y + TINY)
+    inverse = 1.0 / (speed * source.radius)
+    aft = -(offset.x * flow.x + offset.y * flow.y) * inverse
+    aside = abs(offset.x * flow.y - offset.y * flow.x) * inverse
+    through = abs(memory.state[source.inflow] - flow.z * source.inverse_tip_speed)
+    swept = (speed * source.inverse_tip_speed > through) & (aside * source.radius < source.radius + target.radius)
+    return select(swept, maximum(aft, 0.0), 0.0)
 
 
 @kernel
@@ -107,14 +127,3 @@ def limits(angles, number):
     low = interpolated(angles[NUMBER], angles[LOWEST], number)
     high = interpolated(angles[NUMBER], angles[HIGHEST], number)
     return low, high, angles[LEAST][0], angles[MOST][0]
-
-
-@kernel
-def interpolated(knots, values, x):
-    """Linear interpolation, constant beyond the ends."""
-    found = values[0] + 0.0
-    for i in range(1, knots.shape[0]):
-        width = knots[i] - knots[i - 1]
-        share = minimum(maximum((x - knots[i - 1]) / select(width > 0.0, width, 1.0), 0.0), 1.0)
-        found = select(x > knots[i - 1], values[i - 1] + share * (values[i] - values[i - 1]), found)
-    return found

@@ -1,10 +1,11 @@
 """Air that is not the same everywhere: rotors against the plain model, spectra against closed forms."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import Model
+from helpers import CALM, Model, build
 from plain_model import plain_derivative, random_state
 from scipy.interpolate import pade
 from scipy.linalg import expm, solve_continuous_lyapunov
@@ -15,7 +16,7 @@ from sbs_sim.errors import SimulationError
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import turbulence as T
 from sbs_sim.model.air import air_in_space, joined_spaces
-from sbs_sim.model.air_field import LENGTHS, field_grids, sample_field
+from sbs_sim.model.air_field import LENGTHS, WEIGHTS, field_grids, sample_field
 from sbs_sim.model.air_rows import air_rows
 from sbs_sim.model.frames import hub_axes, rotation_matrix
 from sbs_sim.model.gust_table import GustTable
@@ -60,6 +61,32 @@ def test_rotors_meet_the_air_of_their_own_places(name):
     np.testing.assert_array_equal(model.derivative(x, swash, psi, nothing), calm)
 
 
+def test_a_lateral_gradient_of_a_vertical_gust_is_a_roll_rate_of_the_opposite_sign():
+    """W_z = g y is what p = -g is for air loads and inflow, with hubs and blades in the plane of the c.g.
+
+    Inertia takes part in the roll rate alone: what the same state does in vacuum is taken off.
+    """
+    gradient, velocity, psi, found = 0.9, (8.0, 1.0, -2.0), np.array([0.4, 1.3]), []
+    swash = [[0.15, 0.02, -0.03], [0.13, -0.01, 0.02]]
+    for density in (1.225, 0.0):
+        air = {"air_density": density, "kinematic_viscosity": 1.5e-5, "gravity": 9.81}
+        aircraft = build(rotors=[{"hub": [0.02, -0.645, 0.0]}, {"hub": [0.0, 0.66, 0.0]}], environment=air)
+        model, slope = Model(aircraft), np.zeros((3, 3))
+        slope[2, 1] = gradient
+        rows = rows_of(model, np.zeros(3), [(slope @ rotor.hub, slope) for rotor in aircraft.rotors])
+        turning, level = (model.state(velocity, (p, 0.0, 0.0), 0.06) for p in (-gradient, 0.0))
+        cases = (turning, CALM), (level, rows), (level, CALM)
+        found.append([model.derivative(x, swash, psi, wind) for x, wind in cases])
+    turning, gust, calm = np.subtract(*found)
+    np.testing.assert_allclose(gust, turning, rtol=1e-9, atol=1e-11 * np.abs(turning).max())
+    for j in range(2):
+        inflow = aircraft.layout.inflow(j)
+        np.testing.assert_allclose(found[0][1][inflow], found[0][0][inflow], rtol=1e-9)
+        assert np.abs(gust - calm)[inflow].max() > 1e-2 * np.abs(calm[inflow]).max()
+    left, right = ((gust - calm)[aircraft.layout.flap_rate(j).start] for j in range(2))
+    assert right < 0.0 < left, "air that sinks on the right lifts the blades there less"
+
+
 def test_parts_of_the_body_meet_the_air_of_their_own_places():
     """Surfaces in air that turns with the body meet no flow; a uniform gust at all parts is a gust at the c.g."""
     aircraft = Aircraft.load("uh60a_genhel").with_value("options.elements", 3)
@@ -96,7 +123,8 @@ class Sites:
         rows = np.zeros((air_rows(self.model), 1))
         wind = self.field.next_tick()
         rows[:3, 0] = wind[:3]
-        air_in_space(self.model, state[:, np.newaxis].copy(), wind[:, np.newaxis].copy(), time, self.space, rows)
+        psi = np.zeros((len(self.aircraft.rotors), 1))
+        air_in_space(self.model, state[:, np.newaxis].copy(), psi, wind[:, np.newaxis].copy(), time, self.space, rows)
         attitude, count = rotation_matrix(state[ATTITUDE:VELOCITY]), len(self.aircraft.rotors)
         hubs = rows[3 : 3 + 9 * count, 0].reshape(count, 3, 3)
         axes = [attitude @ hub_axes(rotor.shaft_direction) for rotor in self.aircraft.rotors]
@@ -131,11 +159,11 @@ def test_each_rotor_meets_the_field_where_it_is_and_the_field_drifts_with_the_wi
     attitude, time = rotation_matrix(state[ATTITUDE:VELOCITY]), 7.0
     cg, hubs, slopes = sites.at(state, time)
     places = [state[:3], *(state[:3] + attitude @ np.array(rotor.hub) for rotor in sbs.rotors)]
-    points, found = np.array(places)[:, :2] - 5.0 * np.array([3.0, -1.0]), np.empty((3, 9))
-    sample_field(grids, period, points.copy(), found)
+    points = np.array(places)[:, :2] - 5.0 * np.array([3.0, -1.0])
+    found = sampled_at(grids, period, points)
     scale = np.array([1.0, 1.0, 0.5])
-    np.testing.assert_allclose([cg, *hubs], np.array(wind.velocity) + scale * found[:, :3], atol=1e-12)
-    north, east = scale * found[1:, 3:6], scale * found[1:, 6:9]
+    np.testing.assert_allclose([cg, *hubs], np.array(wind.velocity) + scale * found[:, 0], atol=1e-12)
+    north, east = scale * found[1:, 1], scale * found[1:, 2]
     for j, rotor in enumerate(sbs.rotors):
         for k in range(2):
             axis = attitude @ hub_axes(rotor.shaft_direction)[:, k]
@@ -225,6 +253,14 @@ def lateral_spectra(omega, d, length):
     return length / (4 * np.pi) * np.array([u, v, w])
 
 
+def sampled_at(grids, period, points):
+    """Velocity at points, its derivatives to the north and to the east, and the velocity alone, (n, 4, 3)."""
+    out = np.full((len(points), 4, 4), np.nan)
+    sample_field(grids, period, np.ascontiguousarray(points), np.zeros((WEIGHTS, 4)), out)
+    assert not out[..., 3].any()
+    return out[..., :3]
+
+
 def measured_spectra(model, d, seeds=16):
     """Cross-spectra of u, v, w along lines of flight d apart through fields of several seeds, and the wave numbers."""
     count, step, found = 8192, LENGTHS * LENGTH / 8192, []  # waves that are shorter hardly fold down
@@ -236,9 +272,8 @@ def measured_spectra(model, d, seeds=16):
             amplitudes = []
             for side in (0.0, d):
                 points = np.column_stack([np.arange(count) * step, np.full(count, 0.5 * line * period + side)])
-                out = np.empty((count, 9))
-                sample_field(grids, period, points, out)
-                amplitudes.append(np.fft.rfft(out[:, :3] * window[:, np.newaxis], axis=0))
+                out = sampled_at(grids, period, points)[:, 0]
+                amplitudes.append(np.fft.rfft(out * window[:, np.newaxis], axis=0))
             total = total + (amplitudes[0].conj() * amplitudes[1]).real
         found.append(total.T / 2 * step / (2 * np.pi * (window**2).sum()))
     return 2 * np.pi * np.fft.rfftfreq(count, step), np.array(found)
@@ -279,10 +314,8 @@ def test_the_difference_between_two_rotors_has_its_variance():
     for seed in range(20):
         grids, period = field_grids("dryden", 50.0, 50.0, seed)
         points = rng.uniform(0, period, (5000, 2))
-        left, right = np.empty((5000, 9)), np.empty((5000, 9))
-        sample_field(grids, period, points, left)
-        sample_field(grids, period, points + [0.0, SPAN], right)
-        values.append(((left - right)[:, :3] ** 2).mean(axis=0))
+        left, right = sampled_at(grids, period, points), sampled_at(grids, period, points + [0.0, SPAN])
+        values.append(((left - right)[:, 0] ** 2).mean(axis=0))
     f = math.exp(-SPAN / 50)
     expected = 2 * (1 - np.array([f * (1 - SPAN / 100), f, f * (1 - SPAN / 100)]))
     np.testing.assert_allclose(np.mean(values, axis=0), expected, rtol=0.04)
@@ -293,16 +326,14 @@ def test_the_field_is_smooth_and_the_same_for_a_seed():
     assert period == 120.0
     assert grids.nbytes < 2**23
     points = np.random.default_rng(0).uniform(-500, 500, (200, 2))
-    here, there, before = np.empty((200, 9)), np.empty((200, 9)), np.empty((200, 9))
-    sample_field(grids, period, points, here)
-    sample_field(grids[:1], period, points + [period, -2 * period], there)  # the first level repeats itself
-    sample_field(grids[:1], period, points, before)
-    np.testing.assert_allclose(there, before, atol=1e-9)
-    for axis, columns in ((0, slice(3, 6)), (1, slice(6, 9))):
+    here = sampled_at(grids, period, points)
+    np.testing.assert_array_equal(here[:, 3], here[:, 0])  # the velocity alone, for elements of blades
+    there = sampled_at(grids[:1], period, points + [period, -2 * period])  # the first level repeats itself
+    np.testing.assert_allclose(there, sampled_at(grids[:1], period, points), atol=1e-9)
+    for axis in range(2):
         step = 1e-5 * np.eye(2)[axis]
-        sample_field(grids, period, points + step, there)
-        sample_field(grids, period, points - step, before)
-        np.testing.assert_allclose((there - before)[:, :3] / 2e-5, here[:, columns], atol=1e-5)
+        change = sampled_at(grids, period, points + step) - sampled_at(grids, period, points - step)
+        np.testing.assert_allclose(change[:, 0] / 2e-5, here[:, 1 + axis], atol=1e-5)
     field_grids.cache_clear()
     np.testing.assert_array_equal(field_grids("dryden", 3.0, 2.0, 5)[0], grids)
     assert np.abs(field_grids("dryden", 3.0, 2.0, 6)[0] - grids).max() > 0.1
@@ -442,6 +473,7 @@ LOCAL = [
     Wind(turbulence_intensity=(1, 1, 1), turbulence_model="von_karman", turbulence_vertical_length=10.0),
     Wind(turbulence_intensity=(1, 1, 1), turbulence_extent="rates", turbulence_span=2.0),
     Wind(velocity=(2.0, 1.0, 0.0), turbulence_intensity=(1, 1, 0.5), turbulence_extent="field", turbulence_seed=4),
+    Wind(turbulence_intensity=(1, 1, 1), turbulence_extent="elements", gust=(0, 0, 2.0), gust_length=4.0),
     Wind(velocity=(3.0, 0.0, 0.0), wind_profile="logarithmic"),
     Wind(gust=(0, 0, 3.0), gust_length=4.0, gust_distance=1.0),
     Wind(own_gust=GustTable("distance", [0.0, 2.0], [[0, 0, 0], [0, 0, 2.0]])),
@@ -476,11 +508,29 @@ def test_a_gust_on_one_side_rolls_the_aircraft(sbs, hover):
     assert abs(flight["w"][-1] - calm["w"][-1]) < 0.02
 
 
+def test_air_at_blade_elements_is_that_of_rotors_where_it_is_linear(sbs, cruise):
+    """Uniform air gives the same bits; a roll gust dw/dy differs by what flap lifts the blades out of their disc."""
+    for table, heading, least in (
+        (GustTable("distance", [0.0], [[1.0, -2.0, 1.5]]), 0.0, 0.0),
+        (GustTable("distance", [-50.0, 50.0], [[0, 0, 5.0], [0, 0, -5.0]]), math.pi / 2, 1e-3),
+        (GustTable("distance", [-50.0, 50.0], [[5.0, 0, 5.0], [-5.0, 0, -5.0]]), 0.0, 1e-3),
+    ):
+        air = Wind(own_gust=table, gust_direction=heading, turbulence_extent="field")
+        rotors = simulate(sbs, cruise, cruise.controls, 0.1, wind=air)
+        elements = simulate(sbs, cruise, cruise.controls, 0.1, wind=replace(air, turbulence_extent="elements"))
+        difference = np.abs(rotors["state"] - elements["state"]).max()
+        assert (difference == 0.0) == (least == 0.0)
+        assert difference < 1e-6
+        if least:
+            calm = simulate(sbs, cruise, cruise.controls, 0.1, wind=Wind())
+            assert np.abs(calm["state"][-1] - elements["state"][-1]).max() > least
+
+
 @pytest.mark.parametrize(
     ("fields", "line"),
     [
         ({"turbulence_model": "gauss"}, "turbulence_model = 'gauss': allowed are dryden, von_karman"),
-        ({"turbulence_extent": "both"}, "turbulence_extent = 'both': allowed are point, rates, field"),
+        ({"turbulence_extent": "both"}, "turbulence_extent = 'both': allowed are point, rates, field, elements"),
         (
             {"turbulence_extent": "rates"},
             "turbulence_span = 0: allowed is a span above 0 with turbulence_extent = 'rates'",

@@ -15,7 +15,9 @@ from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import AircraftError
 from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.trimmed_state import trimmed_state
+from sbs_sim.flight.validity import warnings
 from sbs_sim.model import state as S
+from sbs_sim.model import working_state as W
 from sbs_sim.model.packing import lane_count, side_by_side
 from sbs_sim.model.records import OTHERS
 
@@ -195,6 +197,40 @@ def test_wash_and_its_slope_are_continuous():
     assert (turns < 0.1 * np.abs(changes).max(axis=0)).all()
 
 
+@pytest.mark.parametrize("edgewise", [0.0, 0.05])
+def test_a_wake_turns_over_without_a_jump(edgewise):
+    """Two rotors one above the other sink at a constant inflow, from wakes below through no flow to wakes above."""
+    aircraft, lambda0 = build("coaxial", options=ON), 0.05
+    upper, lower = aircraft.rotors
+    inflow = lambda0 * upper.speed * upper.radius
+    sinking = np.linspace(0.6, 1.4, 401)
+    model, found = Model(aircraft), []
+    for ratio in sinking:
+        model.derivative(model.state((edgewise * inflow, 0.0, ratio * inflow), lambda0=lambda0))
+        found.append(model.engine.work.wash[OTHERS, :, 0] / lambda0)
+    changes = np.diff(found, axis=0)
+    turns = np.abs(np.diff(changes, axis=0)).max(axis=0)
+    assert (turns < 0.1 * np.abs(changes).max(axis=0)).all()
+    if edgewise == 0.0:  # outside of a quarter of the inflow the wakes that they were
+        there, back = pair_of(upper, lower), pair_of(lower, upper)
+        for row, down in ((found[0], 1.0), (found[-1], -1.0)):
+            expected = [influence(pair, np.array([[0.0, 0.0, down]]))[0, 0] for pair in (back, there)]
+            np.testing.assert_allclose(row, expected, atol=2e-3)
+
+
+def test_where_wakes_roll_up_or_have_no_direction_is_said():
+    rolled, none = "where that rolls up", "hardly any flow through the disc"
+    lines = trim(meeting(name="tandem"), 15.0).warnings
+    assert [line.split(":")[0] for line in lines if rolled in line] == ["R2"]  # the rear one
+    assert not any(rolled in line for name in ("coaxial", "sbs") for line in trim(meeting(name=name), 15.0).warnings)
+    rows = np.zeros((2, W.WORKING_SIZE))
+    rows[:, W.HOVER_INFLOW], rows[:, W.DESCENT] = 0.06, 0.01
+    for flow, along, said in ((0.01, 0.0, True), (-0.01, 0.0, True), (0.02, 0.0, False), (0.01, 0.02, False)):
+        rows[:, W.FLOW], rows[:, W.ADVANCE_RATIO] = flow, along
+        assert any(none in line for line in warnings(meeting(), rows)) == said
+        assert not any(none in line for line in warnings(build(options=OFF), rows))
+
+
 @pytest.mark.parametrize("lanes", ["blades", "points"])
 @pytest.mark.parametrize("name", ["sbs", "tilted", "tail rotor", "paper"])
 def test_kernel_agrees_with_the_plain_reference(name, lanes):
@@ -244,6 +280,26 @@ def test_mirrored_pairs_have_mirrored_tables():
     left, right = meeting().rotors
     there, back = node_values(pair_of(left, right)), node_values(pair_of(right, left))
     np.testing.assert_array_equal(there, np.flip(back, 2) * [1.0, 1.0, -1.0])
+
+
+def test_a_canted_rotor_in_the_plane_of_symmetry_has_mirrored_tables():
+    """Of both senses of the cant, on one hub."""
+    axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [0.0, 0.8, 0.6]])
+    there, back = (node_values(lying(-1.4, 0.0, 0.1, radius=0.2, axes=one)) for one in (axes, axes.T))
+    np.testing.assert_array_equal(there, np.flip(back, 2) * [1.0, 1.0, -1.0])
+
+
+def test_the_tables_of_symmetric_places_are_symmetric():
+    """No rounding is enlarged where a disc is near a filament or a wake nearly level."""
+    values = node_values(lying(-1.7, 0.0, -0.12, axes=((0.99, 0, 0.141), (0, 1, 0), (-0.141, 0, 0.99)), expansion=0.5))
+    np.testing.assert_allclose(values, np.flip(values, 2) * [1.0, 1.0, -1.0], atol=1e-13)
+
+
+def test_a_nearly_level_wake_meets_what_a_level_one_meets():
+    """Its axis at the depth of the disc is far away, and the hub's way from it is no difference of such lengths."""
+    pair = lying(-1.4321, 0.3, 0.4, expansion=0.5)
+    level, nearly = (influence(pair, np.array([[-1.0, 0.0, slope]])) for slope in (0.0, 1e-14))
+    np.testing.assert_allclose(nearly, level, atol=1e-10)
 
 
 def test_a_symmetric_aircraft_flies_straight():

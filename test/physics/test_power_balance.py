@@ -2,6 +2,7 @@
 
 import functools
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,10 +42,12 @@ OWN = {
     "wakes": {"duct", "interference"},
 }
 SECTIONS = {"tip_loss_model": "prandtl", "profile_drag": "oblique", "descent": "measured", "induced_power_factor": 1.1}
+STALL = {"dynamic_stall": "separation"}
+LATE = {"unsteady_airfoil": "jones"}
 AIRCRAFT = {
     "sbs": lambda: Aircraft.load("sbs"),
-    "ducts": lambda: build(every_rotor={"duct": DUCT}),
-    "air": lambda: build(options={"interference": "skewed_wake"}, every_rotor=SECTIONS),
+    "ducts": lambda: build(every_rotor={"duct": DUCT, **LATE}),
+    "air": lambda: build(options={"interference": "skewed_wake"}, every_rotor=SECTIONS | LATE | STALL),
     "shares": lambda: build(every_rotor={"duct_expansion": 0.8, "induced_power_factor": 1.15}),
     "drives": lambda: Aircraft.load(DATA / "electric.yaml"),
     "tails": lambda: Aircraft.load("uh60a_genhel"),
@@ -57,14 +60,14 @@ def hover_power(name):
     return float(trim(AIRCRAFT[name]()).power.sum())
 
 
-def manoeuvre(aircraft, airspeed, duration=0.4, **options):
+def manoeuvre(aircraft, airspeed, duration=0.4, wind=WIND, **options):
     """Return a flight in wind and a gust in which one control after the other takes a step."""
     point = trim(aircraft, airspeed)
     controls = np.tile(point.controls, (round(duration / 0.01) + 1, 1))
     for k, i in enumerate(aircraft.trimmed_controls):
         low, high = aircraft.controls[i].range
         controls[4 + 4 * k :, i] += math.copysign(0.04 * (high - low), (low + high) / 2 - point.controls[i])
-    return simulate(aircraft, point, controls, duration, wind=WIND, outputs=["power_balance"], **options)
+    return simulate(aircraft, point, controls, duration, wind=wind, outputs=["power_balance"], **options)
 
 
 @pytest.mark.parametrize("name", AIRCRAFT)
@@ -75,6 +78,22 @@ def test_the_balance_closes_at_every_tick_of_a_manoeuvre(name):
     assert {"engine", "induced", "profile", "fuselage", "gravity", "kinetic_body", "kinetic_blades"} <= taken
     assert {"apparent_mass", "wind"} <= taken
     assert OWN.get(name, set()) <= taken
+
+
+FIELD = Wind(velocity=(-3.0, 2.0, 0.5), turbulence_intensity=(2.0, 2.0, 1.5), turbulence_length=5.0,
+             turbulence_extent="field")  # fmt: skip
+ELEMENTS = replace(FIELD, turbulence_extent="elements")
+FRONT = Wind(velocity=(-3.0, 2.0, 0.5), gust=(1.0, 2.0, -4.0), gust_length=4.0, wind_profile="power")
+RATES = Wind(turbulence_intensity=(1.0, 1.0, 1.0), turbulence_extent="rates", turbulence_span=2.0)
+
+
+@pytest.mark.parametrize(("name", "wind"), [("sbs", FIELD), ("air", FIELD), ("wakes", FRONT), ("tails", FIELD),
+                                            ("drives", RATES), ("wakes", ELEMENTS)])  # fmt: skip
+def test_the_balance_closes_in_air_that_is_not_the_same_everywhere(name, wind):
+    """Each force with the air where it acts: blades, surfaces, fuselages, ducts."""
+    flight = manoeuvre(AIRCRAFT[name](), 10.0, 0.2, wind)
+    assert missing(flight) < CLOSED * hover_power(name)
+    assert np.abs(flight["power_wind"]).max() > 1e-2 * hover_power(name)
 
 
 @pytest.mark.parametrize("fidelity", [{"lead_lag": False}, {"cyclic_inflow": False}])
@@ -108,6 +127,16 @@ def test_the_balance_closes_with_blades_off_their_pitch_axis(kind, drives):
     rows = power_balance(model.engine, *(np.array([values]) for values in (x, swash, psi, wind)))
     assert missing(rows) < 1e-11 * np.abs(rows).max()
     assert rows[0][POWER_TERMS.index("profile")] > 0.0
+    if not drives:  # in a field, too
+        flight = simulate(
+            aircraft,
+            x,
+            np.zeros(len(aircraft.control_names)),
+            0.02,
+            wind=FIELD if kind == "each" else ELEMENTS,
+            outputs=["power_balance"],
+        )
+        assert missing(flight) < 1e-11 * np.abs(flight["power_balance"]).max()
 
 
 @pytest.mark.parametrize("effect", ["none", "measured"])

@@ -6,7 +6,10 @@ from helpers import Model, build, write_airfoil
 from plain_model import prandtl, random_state
 from test_dynamics import largest_error, stand
 
+from sbs_sim.lanes import as_quads
 from sbs_sim.model import records as R
+from sbs_sim.model.kernel import entry
+from sbs_sim.model.section_options import mean_factor
 
 OPTIONS = {
     "tip loss": {"tip_loss_model": "prandtl"},
@@ -71,6 +74,22 @@ def test_elements_have_the_mean_of_prandtls_factor():
     middle, gauss = 0.975, 0.025 / np.sqrt(3.0)
     mean = prandtl(rotor, outer, 0.06).mean()
     assert prandtl(rotor, np.array([middle - gauss, middle + gauss]), 0.06).mean() == pytest.approx(mean, rel=0.02)
+
+
+@entry
+def mean_factors(decays, out):
+    """Mean factors, shape (n, 4), of outer and inner decays, (n, 2, 4)."""
+    given, found = as_quads(decays), as_quads(out)
+    for i in range(out.shape[0]):
+        found[i] = mean_factor(given[i, 0], given[i, 1])
+
+
+def test_the_series_inboard_is_the_arccosine_to_the_last_bits():
+    outer = np.concatenate([np.geomspace(1e-18, 1.0, 4000), 0.05 + np.linspace(-1e-9, 1e-9, 8)]).reshape(-1, 4)
+    decays, out = np.stack([outer, 0.6 * outer], axis=1), np.empty_like(outer)
+    mean_factors(decays, out)
+    np.testing.assert_allclose(out, np.arccos(decays).mean(axis=1) * 2 / np.pi, rtol=0, atol=4e-16)
+    assert (out[outer < 1e-16] == 1.0).all()
 
 
 def profile_power(folder, mu, **rotor):

@@ -4,8 +4,9 @@ import collections
 import copy
 
 import numpy as np
-from balances import balance, rates_of_totals
+from balances import at_speeds, azimuths, balance, commanded, plain_state, rates_of_totals
 from helpers import POLAR, Model, mirrored_data, mirrored_state, mirrored_swash, unit
+from plain_model import inflow_rate, make_instant, rotation_matrix
 from scipy.linalg import eig
 
 from sbs_sim import Aircraft
@@ -30,6 +31,10 @@ def violent_state(model, rng):
         for part, scale in (*parts, *rates):
             x[part] = scale * rng.normal(size=rotor.blades)
         x[layout.inflow(j)] = [0.05, 0.0, 0.0] + 0.01 * rng.normal(size=3)
+        if rotor.has_wake_states:
+            x[layout.wake(j)] = 0.05 * rng.normal(size=2 * rotor.blades)
+        if rotor.is_teetering:  # its coning does not change
+            x[layout.flap(j).start], x[layout.flap_rate(j).start] = rotor.flap_rest, 0.0
     for i, drive in enumerate(aircraft.drives):
         values = {
             "Omega": aircraft.drive_speed(i) * rng.uniform(0.8, 1.1),
@@ -42,7 +47,22 @@ def violent_state(model, rng):
     if aircraft.body.is_stand:
         x[S.POSITION : S.ATTITUDE] *= 0.01
         x[S.VELOCITY : S.BODY_SIZE] *= aircraft.body.stand_free
+    if aircraft.has_contact:
+        _touch(aircraft, x, rng)
+    if layout.separations:
+        x[layout.separations_start :] = rng.uniform(size=layout.separations)
     return x
+
+
+def _touch(aircraft, x, rng):
+    """Put an aircraft where its lowest contact point is in the ground, with deflections along it."""
+    ground, points, attitude = aircraft.ground, aircraft.contact_points, rotation_matrix(x[S.ATTITUDE : S.VELOCITY])
+    tilt = np.tan(ground.slope) * np.array([np.cos(ground.slope_heading), np.sin(ground.slope_heading)])
+    below = [point + [0.0, 0.0, point[:2] @ tilt] for point in (x[:3] + attitude @ p.position for p in points)]
+    depth = points[0].onset * rng.uniform(0.5, 3.0)
+    x[2] += -ground.altitude + depth - max(point[2] for point in below)
+    for i in range(len(points)):
+        x[aircraft.layout.contact(i)] = depth * rng.normal(size=2)
 
 
 def instant(aircraft, number):
@@ -52,8 +72,9 @@ def instant(aircraft, number):
     model, rng, count = Model(Aircraft.from_dict(data)), np.random.default_rng([5, number]), len(aircraft.rotors)
     x, psi = violent_state(model, rng), rng.uniform(0.0, 6.0, count)
     swash = 0.05 * rng.normal(size=(count, 3)) + [0.1, 0.0, 0.0]
-    commands = np.tile([0.6, 1.0, 0.0], (len(aircraft.rows) - count, 1))  # throttle and set point of drives
-    swash = np.concatenate([swash, commands])
+    commands = [0.6, 1.0, 0.0], [0.1, 0.0, 0.0]  # throttle and set point of drives; of surfaces and controls
+    is_drive = [row.owner.startswith("drive ") for row in aircraft.rows[count:]]
+    swash = np.concatenate([swash, np.reshape([commands[0] if own else commands[1] for own in is_drive], (-1, 3))])
     return data, model, x, swash, psi, 5.0 * rng.normal(size=3)
 
 
@@ -63,8 +84,24 @@ def mirror_error(aircraft, number):
     rates, image = model.derivative(x, swash, psi, wind), Model(Aircraft.from_dict(mirrored_data(data)))
     count = len(aircraft.rotors)
     mirrored = np.concatenate([mirrored_swash(swash[:count]), swash[count:]])
-    found = image.derivative(mirrored_state(x), mirrored, psi, wind * POLAR)
-    return float(np.abs(found - mirrored_state(rates)).max() / np.abs(rates).max())
+    found = image.derivative(mirrored_state(x, aircraft.layout), mirrored, psi, wind * POLAR)
+    return float(np.abs(found - mirrored_state(rates, aircraft.layout)).max() / np.abs(rates).max())
+
+
+def inflow_error(aircraft, number):
+    """Return how far the rates of the inflow are from those of the plain model, relative to the largest."""
+    _, model, x, rows, psi, wind = instant(aircraft, number)
+    aircraft, rates = model.aircraft, model.derivative(x, rows, psi, wind)
+    plain, (swash, body) = at_speeds(aircraft, x), commanded(aircraft, x, rows, wind)
+    plain.body = body
+    found = make_instant(plain, plain_state(aircraft, x), swash, azimuths(aircraft, x, psi), wind)
+    expected = [
+        inflow_rate(plain, rotor, *(part[j] for part in parts), True, found.washes[j].through)
+        for j, rotor in enumerate(plain.rotors)
+        for parts in [(found.blades, found.air_loads, found.state.inflow, found.hub_velocities)]
+    ]
+    own = [rates[aircraft.layout.inflow(j)] for j in range(len(expected))]
+    return float(np.abs(np.subtract(own, expected)).max() / np.abs(expected).max())
 
 
 def balance_errors(aircraft, number):
@@ -78,7 +115,8 @@ def balance_errors(aircraft, number):
     errors = {}
     for where, one, blown in (("air", model, wind), ("vacuum", Model(Aircraft.from_dict(empty)), 0.0 * wind)):
         rates = one.derivative(x, swash, psi, blown)
-        p, h, energy = rates_of_totals(one.aircraft, x, rates, psi, swash)
+        angles, _ = commanded(one.aircraft, x, swash, blown)
+        p, h, energy = rates_of_totals(one.aircraft, x, rates, psi, angles)
         found = balance(one, x, swash, psi, blown)
         weight = aircraft.body.mass * aircraft.environment.gravity
         powers = [found.body, found.drag, found.flow, found.dampers, found.engines]

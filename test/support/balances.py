@@ -4,10 +4,12 @@ The plain model takes the speeds of rotors as given; here those of a state are p
 so that rates follow from a complex step.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
+from plain_commands import plain_commands
 from plain_model import (
     cross,
     damper_moments,
@@ -57,8 +59,13 @@ def at_speeds(aircraft, x, rates=None):
         values["shaft_direction"] = rotor.shaft_direction / np.linalg.norm(rotor.shaft_direction)
         values["speed_rate"] = 0.0 if rates is None or i < 0 else gear * rates[i]
         rotors.append(SimpleNamespace(**values))
-    plain = {name: getattr(aircraft, name) for name in ("environment", "body", "options", "airfoils")}
-    return SimpleNamespace(**plain, rotors=tuple(rotors))
+    names = ("environment", "body", "options", "sections", "ground", "has_contact", "contact_points")
+    return SimpleNamespace(**{name: getattr(aircraft, name) for name in names}, rotors=tuple(rotors))
+
+
+def plain_state(aircraft, x):
+    """Return the state as the plain model has it, without those of drives."""
+    return np.concatenate([x[: aircraft.layout.drives_start], x[aircraft.layout.contacts_start :]])
 
 
 def azimuths(aircraft, x, psi0):
@@ -71,10 +78,9 @@ def azimuths(aircraft, x, psi0):
 
 def totals(aircraft, x, psi0, swash=None):
     """Return linear and angular momentum, NED, and energy of body, blades and transmissions."""
-    plain, size = at_speeds(aircraft, x), aircraft.layout.drives_start
-    psi = azimuths(aircraft, x, psi0)
-    p, h = momentum(plain, x[:size], psi, swash)
-    total = energy(plain, x[:size], psi, swash)
+    plain, own, psi = at_speeds(aircraft, x), plain_state(aircraft, x), azimuths(aircraft, x, psi0)
+    p, h = momentum(plain, own, psi, swash)
+    total = energy(plain, own, psi, swash)
     for i, drive in enumerate(aircraft.drives):
         speed = x[aircraft.layout.drive(i)["Omega"]]
         h = h + rotation_matrix(x[S.ATTITUDE : S.VELOCITY]) @ (drive.inertia * speed * drive.inertia_axis)
@@ -97,8 +103,8 @@ class Balance(NamedTuple):
     force, moment : array, shape (3,)
         Of air and weight on the whole aircraft, NED; the moment about the inertial origin [N, N m].
     body, drag, flow : float
-        Power that the air gives to fuselage, surfaces and ducts; that the drag of the blades takes; that the blades
-        give to the induced flow and to the wind [W].
+        Power that the air gives to fuselage, surfaces and ducts, and the ground to contact points; that the drag of the
+        blades takes; that the blades give to the induced flow and to the wind [W].
     dampers, engines : float
         Power that lag dampers and those of a stand give, which is negative; of engines, motors and of what keeps the
         speed of rotors without a drive [W].
@@ -118,11 +124,19 @@ class Balance(NamedTuple):
         return self.body - self.drag - self.flow + self.dampers + self.engines
 
 
-def balance(model, x, swash, psi0, wind=(0.0, 0.0, 0.0)):
+def commanded(aircraft, x, rows, wind=(0.0, 0.0, 0.0)):
+    """Return the swashplate angles, shape (n_rotors, 3) [rad], and the body with the surfaces that rows command."""
+    air = rotation_matrix(x[S.ATTITUDE : S.VELOCITY]).T @ np.asarray(wind, dtype=float)
+    swash, surfaces = plain_commands(aircraft, rows, np.linalg.norm(x[S.VELOCITY : S.RATES] - air))
+    return swash, replace(aircraft.body, surfaces=surfaces)
+
+
+def balance(model, x, rows, psi0, wind=(0.0, 0.0, 0.0)):
     """Return the `Balance` of a state of a `helpers.Model`, whose last derivative was that of this state."""
-    aircraft, size = model.aircraft, model.layout.drives_start
+    aircraft, own = model.aircraft, plain_state(model.aircraft, x)
     plain, psi = at_speeds(aircraft, x), azimuths(aircraft, x, psi0)
-    instant = make_instant(plain, x[:size], swash, psi, wind, model.lead_lag, model.cyclic_inflow)
+    swash, plain.body = commanded(aircraft, x, rows, wind)
+    instant = make_instant(plain, own, swash, psi, wind, model.lead_lag, model.cyclic_inflow)
     state, attitude = instant.state, rotation_matrix(x[S.ATTITUDE : S.VELOCITY])
     air = attitude.T @ np.asarray(wind, dtype=float)
     force, moment = instant.fuselage_force, instant.fuselage_moment
@@ -136,7 +150,8 @@ def balance(model, x, swash, psi0, wind=(0.0, 0.0, 0.0)):
         force, moment = force + duct, moment + duct_moment
         for k, blade in enumerate(instant.blades[j]):
             for s, load in instant.air_loads[j][k]:
-                gained = carried - induced_velocity(rotor, blade, s, state.inflow[j])
+                inflow, wake = state.inflow[j] + instant.washes[j].blades, instant.wake_washes[j][k]
+                gained = carried - induced_velocity(rotor, blade, s, inflow, wake)
                 # lift is normal to the section's velocity relative to the air
                 drag -= load @ (blade.velocity(s, hub_velocity) - gained)
                 flow -= load @ gained
@@ -147,19 +162,20 @@ def balance(model, x, swash, psi0, wind=(0.0, 0.0, 0.0)):
         dampers -= motion @ (plain.body.stand_damping * motion)
     weight = np.array([0.0, 0.0, plain.environment.gravity])
     p = attitude @ force
-    h = cross(state.position, p) + attitude @ moment + cross(first_moment(plain, x[:size], psi, swash), weight)
+    h = cross(state.position, p) + attitude @ moment + cross(first_moment(plain, own, psi, swash), weight)
     engines = engine_power(aircraft, x, model.loads[:, R.TORQUE])
     return Balance(p + plain.body.mass * weight, h, body, drag, flow, dampers, engines)
 
 
-def induced_velocity(rotor, blade, s, inflow):
-    """Return the induced velocity at the station s of a blade as its sections see it [m/s]."""
+def induced_velocity(rotor, blade, s, inflow, wake):
+    """Return the induced velocity at the station s of a blade as its sections see it, with that of its wake [m/s]."""
     lambda0, lambdas, lambdac = inflow
     cyclic = lambdac * np.cos(blade.azimuth) + lambdas * np.sin(blade.azimuth)
     share = (rotor.hinge_offset + span_of(s)) / rotor.radius
     speed = rotor.induced_power_factor * rotor.inflow_speed
-    along = blade.u if has_offsets(rotor) else np.cos(blade.flap) * blade.n  # sweep sees the flow along the span
-    return speed * rotor.radius * (lambda0 + share * cyclic) * along
+    sees_span = has_offsets(rotor) or rotor.profile_drag == "oblique"  # the flow along the span
+    along = blade.u if sees_span else np.cos(blade.flap) * blade.n
+    return (speed * rotor.radius * (lambda0 + share * cyclic) + wake * share) * along
 
 
 def damping_power(instant, j, k):

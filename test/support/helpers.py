@@ -265,6 +265,10 @@ def mirrored_data(data):
         rotor["rotation"] = -rotor["rotation"]
         if "lateral_cyclic" in rotor.get("swashplate_offset_deg", {}):
             rotor["swashplate_offset_deg"]["lateral_cyclic"] *= -1.0
+        for entry in rotor.get("schedule", []):  # of a control that is itself the image
+            sign = -1.0 if entry["angle"] == "lateral_cyclic" else 1.0
+            for key in {"factor", "offset_deg"} & entry.keys():
+                entry[key] = [sign * value for value in entry[key]]
     for drive in image.get("drives", []):
         drive["inertia_axis"] = (AXIAL * drive.get("inertia_axis", [0.0, 0.0, 0.0])).tolist()
     for surface in image["body"].get("surfaces", []):
@@ -272,6 +276,11 @@ def mirrored_data(data):
         surface["dihedral_deg"] = -surface["dihedral_deg"]
     if "fuselage" in image["body"]:
         _mirror_fuselage(image["body"]["fuselage"])
+    for point in image.get("contact_points", []):
+        for key in {"position", "rolling"} & point.keys():
+            point[key] = (POLAR * point[key]).tolist()
+    if "slope_heading_deg" in image.get("ground", {}):
+        image["ground"]["slope_heading_deg"] *= -1.0
     return image
 
 
@@ -289,13 +298,18 @@ def _mirror_fuselage(fuselage):
             table["grid"] = [[sign * value for value in reversed(row)] for row in table["grid"]]
 
 
-def mirrored_state(x):
-    """Return the image of a state; a rotor's own coordinates follow its advancing side and stay as they are."""
+def mirrored_state(x, layout=None):
+    """Return the image of a state; a rotor's own coordinates follow its advancing side and stay as they are.
+
+    The deflections of contact points to the right change sides, if a layout says where they are.
+    """
     image = np.array(x, dtype=float)
     image[S.POSITION : S.ATTITUDE] *= POLAR
     image[S.ATTITUDE + 1 : S.VELOCITY] *= AXIAL
     image[S.VELOCITY : S.RATES] *= POLAR
     image[S.RATES : S.BODY_SIZE] *= AXIAL
+    for i in range(layout.contacts if layout else 0):
+        image[layout.contact(i)] *= [1.0, -1.0]
     return image
 
 

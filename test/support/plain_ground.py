@@ -84,8 +84,8 @@ def ground_washes(ac, state, attitude, hub_velocities):
     found = []
     for rotor, inflow, velocity in zip(ac.rotors, state.inflow, hub_velocities, strict=True):
         height = max(0.0, distance - down @ (state.position + attitude @ rotor.hub)) / rotor.radius
-        motion = attitude @ velocity
-        along = np.linalg.norm(motion - (motion @ down) * down) / (rotor.speed * rotor.radius)
+        motion, scale = attitude @ velocity, getattr(rotor, "inflow_speed", rotor.speed)
+        along = np.linalg.norm(motion - (motion @ down) * down) / (scale * rotor.radius)
         thrust = np.asarray(rotor.shaft_direction) / np.linalg.norm(rotor.shaft_direction)
         tilt = max(0.0, -(attitude @ thrust) @ down)
         decay = tilt / (1.0 + (along / inflow[0]) ** 2)

@@ -48,9 +48,14 @@ def influence_of(source, target, lambda0, velocity):
     ahead, right, down = axes_of(source).T
     flow = tip_speed(source) * lambda0 - down @ velocity
     edgewise = np.array([ahead @ velocity, right @ velocity])
-    total = np.sqrt(edgewise @ edgewise + flow**2 + (1e-5 * tip_speed(source)) ** 2)
-    x, y = edgewise / (total + abs(flow))
-    values = node_values(pair_of(source, target))[int(flow < 0)]
+    reach = max(0.25 * abs(tip_speed(source) * lambda0), 1e-5 * tip_speed(source))
+    size = abs(flow) if abs(flow) >= reach else (flow**2 + reach**2) / (2 * reach)
+    total = np.sqrt(edgewise @ edgewise + size**2 + (1e-5 * tip_speed(source)) ** 2)
+    x, y = edgewise / (total + size)
+    ratio = np.clip(flow / reach, -1.0, 1.0)
+    down = 0.5 + 0.75 * ratio - 0.25 * ratio**3
+    values = node_values(pair_of(source, target))
+    values = down * values[0] + (1.0 - down) * values[1]
     grid = np.linspace(-1, 1, CELLS + 1)
     return [RectBivariateSpline(grid, grid, values[:, :, k])(x, y)[0, 0] for k in range(3)]
 

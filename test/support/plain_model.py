@@ -25,6 +25,7 @@ import numpy as np
 from plain_ground import contact, ground_washes
 from plain_interference import all_washes
 from plain_parts import part_loads
+from plain_ring import added_inflow, ring_shares
 from scipy.interpolate import CubicHermiteSpline
 
 #: Smooth floor of the inflow's total velocity V_T, in units of the tip speed (theory.md section 6).
@@ -135,7 +136,8 @@ def split_state(ac, x, lead_lag=True, cyclic_inflow=True):
     -------
     SimpleNamespace
         position (3,) NED, quaternion (4,), velocity (3,) body, rate (3,) body; flap, flap_rate, lag,
-        lag_rate: lists of (N_b,) multiblade; inflow: list of (3,) lambda0, lambdas, lambdac.
+        lag_rate: lists of (N_b,) multiblade; inflow: list of (3,) lambda0, lambdas, lambdac; wake: list of (2, N_b)
+        multiblade, (2, 0) without unsteady airfoil.
     """
     x = np.asarray(x)
     parts, start = {}, 13
@@ -147,10 +149,23 @@ def split_state(ac, x, lead_lag=True, cyclic_inflow=True):
             start += rotor.blades
     kept = np.array([1.0, 1.0, 1.0]) if cyclic_inflow else np.array([1.0, 0.0, 0.0])
     parts["inflow"] = [x[start + 3 * j : start + 3 * j + 3] * kept for j in range(len(ac.rotors))]
+    start += 3 * len(ac.rotors)
+    shares = np.zeros(0)
+    if count := section_count(ac):
+        x, shares = x[:-count], x[-count:]
+    parts["separation"] = [
+        [shares[section_places(ac, j, k)] for k in range(rotor.blades)] if len(shares) else None
+        for j, rotor in enumerate(ac.rotors)
+    ]
+    parts["wake"] = []
+    for rotor in ac.rotors:
+        size = 2 * rotor.blades if has_wake(rotor) else 0
+        parts["wake"].append(x[start : start + size].reshape(2, -1))
+        start += size
     if stands_on_ground(ac):  # the deflections of its contact points stand behind
         x = x[: len(x) - 2 * len(ac.contact_points)]
-    if len(x) != start + 3 * len(ac.rotors):
-        raise ValueError(f"state of length {len(x)}, expected {start + 3 * len(ac.rotors)}")
+    if len(x) != start:
+        raise ValueError(f"state of length {len(x)}, expected {start}")
     return SimpleNamespace(position=x[0:3], quaternion=x[3:7], velocity=x[7:10], rate=x[10:13], **parts)
 
 
@@ -196,6 +211,46 @@ def mass_points(rotor, second_moment=None):
 def stands_on_ground(ac):
     """Return whether contact points carry it (section 7.7)."""
     return getattr(ac, "has_contact", False)
+
+
+def has_late_separation(rotor):
+    """Return whether separation on its sections follows the flow late (section 4.10)."""
+    return getattr(rotor, "dynamic_stall", "none") == "separation"
+
+
+def section_places(ac, j, k):
+    """Return where the sections of blade k of rotor j are among those of all, from the root outwards.
+
+    Blades stand in quads of one rotor, two quads beside each other, the sections of these one after the other.
+    """
+    quad = sum(-(-rotor.blades // 4) for rotor in ac.rotors[:j]) + k // 4
+    return (quad // 2 * ac.options.elements + np.arange(ac.options.elements)) * 8 + quad % 2 * 4 + k % 4
+
+
+def section_count(ac):
+    """Return the number of states of late separation, at the end of the state; 0 without it."""
+    if not any(map(has_late_separation, ac.rotors)):
+        return 0
+    return 8 * -(-sum(-(-rotor.blades // 4) for rotor in ac.rotors) // 2) * ac.options.elements
+
+
+def late_lift(airfoil, number, angle, steady, share):
+    """Return the lift coefficient of a section of whose chord a share is attached, and the share that stays there."""
+    near = np.abs(airfoil.alpha) < max(np.radians(5.0), 1.5 * np.diff(airfoil.alpha)[len(airfoil.alpha) // 2])
+    lines = [np.polyfit(airfoil.alpha[near], cl[near], 1) for cl in airfoil.cl]
+    numbers = np.asarray(airfoil.numbers, dtype=float)
+    slope = np.interp(number, numbers, [line[0] for line in lines])
+    angle = angle - np.interp(number, numbers, [-line[1] / line[0] for line in lines])
+    attached = slope * angle
+    root = np.clip(2 * np.sqrt(max(steady / attached, 0.0)) - 1, 0, 1) if abs(attached) > 1e-3 else 1.0
+    gap = attached * (3 + root) / (4 * (1 + root)) if root > 0 else attached - steady
+    window = np.clip((np.radians(60) - abs(angle)) / np.radians(30), 0, 1)
+    return steady + window * gap * (share - root**2), root**2
+
+
+def has_wake(rotor):
+    """Return whether its circulation follows the flow late (section 4.9)."""
+    return getattr(rotor, "unsteady_airfoil", "steady") == "jones"
 
 
 def has_offsets(rotor):
@@ -521,13 +576,16 @@ def along_blade(rotor, name, s):
     return first + (last - first) * (share - inner) / (outer - inner)
 
 
-def airfoil_at(rotor, radius):
-    """Return the name of the airfoil at a share of the radius: the last one that begins inboard of it."""
-    name = rotor.airfoil
-    if getattr(rotor, "outboard_stations", None) is not None:
-        for station, outboard in zip(rotor.outboard_stations, rotor.outboard_airfoils, strict=True):
-            name = outboard if radius >= station else name
-    return name
+def airfoil_at(ac, rotor, radius):
+    """Return the airfoil table at a share of the radius: the last one that begins inboard of it.
+
+    Tables of an aircraft belong to its rotors, with the drag that each adds; without rotors of their own to names.
+    """
+    stations = getattr(rotor, "outboard_stations", None)
+    inboard = 0 if stations is None else sum(radius >= station for station in stations)
+    if hasattr(ac, "sections"):
+        return ac.sections[[one.name for one in ac.rotors].index(rotor.name)][inboard]
+    return ac.airfoils[(rotor.airfoil, *(getattr(rotor, "outboard_airfoils", None) or ()))[inboard]]
 
 
 def hinge_pitch(blade, swash):
@@ -541,7 +599,35 @@ def hinge_pitch(blade, swash):
     )
 
 
-def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=None):
+def circulation(ac, blade, swash, inflow, air_velocity_hub, parts, air_gradient=None):
+    """Return the rates [1/s] of the two parts of a blade's circulation, and the wash of its wake at the tip [m/s].
+
+    `parts`, shape (2,), are those of the blade itself; the other parameters are those of `blade_air_loads`.
+    """
+    rotor = blade.rotor
+    s, tip_speed = 0.75 * rotor.radius - rotor.hinge_offset, inflow_speed(rotor) * rotor.radius
+    velocity = blade.velocity(s, air_velocity_hub)
+    if air_gradient is not None:
+        velocity = velocity - air_gradient @ blade.position(s)
+    cyclic = inflow[2] * np.cos(blade.azimuth) + inflow[1] * np.sin(blade.azimuth)
+    u_t = velocity @ blade.t
+    u_p = velocity @ blade.n + blade_inflow_speed(rotor) * rotor.radius * (inflow[0] + 0.75 * cyclic) * np.cos(
+        blade.flap
+    )
+    airfoil = airfoil_at(ac, rotor, 0.75)
+    lift = airfoil.cl[len(airfoil.numbers) // 2]
+    near = np.abs(airfoil.alpha) < 0.35
+    no_lift = np.interp(0.0, lift[near], airfoil.alpha[near])
+    angle = hinge_pitch(blade, swash)[0] + along_blade(rotor, "twist", s) - no_lift
+    across = (u_t * np.sin(angle) - u_p * np.cos(angle)) / tip_speed
+    speed = np.hypot(u_t, u_p)
+    speed *= max(1.0 - (speed / ac.environment.speed_of_sound) ** 2, 0.19)
+    late = across - parts
+    rates = 2.0 * speed / along_blade(rotor, "chord", s) * np.array([0.0455, 0.3]) * late
+    return rates, tip_speed * np.array([0.165, 0.335]) @ late / 0.75
+
+
+def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=None, wake=0.0, shares=None, rates=None):
     """Return the aerodynamic force of every element of a blade.
 
     Parameters
@@ -556,6 +642,12 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=Non
         Velocity of the hub relative to the undisturbed air [m/s], body axes.
     air_gradient : array, shape (3, 3), or None
         Change of the air's velocity per metre from the hub within the disc [1/s], body axes: velocity = it @ position.
+    wake : float
+        Wash of the blade's wake at the tip [m/s], which grows along the radius.
+    shares : array, shape (elements,), optional
+        Attached shares of the chord of its sections, of late separation.
+    rates : list, optional
+        Output, with `shares`: their rates [1/s].
 
     Returns
     -------
@@ -583,7 +675,7 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=Non
             blade_inflow_speed(rotor)
             * rotor.radius
             * (lambda0 + (rotor.hinge_offset + span_of(point)) / rotor.radius * cyclic)
-        )
+        ) + wake * (rotor.hinge_offset + span_of(point)) / rotor.radius
         if has_offsets(rotor):
             loads.append((point, swept_force(ac, blade, inner, outer, pitch, velocity + induced * blade.u)))
             continue
@@ -591,13 +683,16 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=Non
         u_p = velocity @ blade.n + induced * np.cos(blade.flap)
         # The section sees the flow across the span only: |V| is the speed in the plane of t and n.
         speed = np.hypot(u_t, u_p)
-        airfoil = ac.airfoils[airfoil_at(rotor, (rotor.hinge_offset + s) / rotor.radius)]
-        cl, cd = airfoil_coefficients(
-            airfoil,
-            speed / air.speed_of_sound if airfoil.axis == "mach" else speed * chord / air.kinematic_viscosity,
-            pitch - np.arctan2(u_p, u_t),
-            ac.options.interpolation,
-        )
+        airfoil = airfoil_at(ac, rotor, (rotor.hinge_offset + s) / rotor.radius)
+        number = speed / air.speed_of_sound if airfoil.axis == "mach" else speed * chord / air.kinematic_viscosity
+        alpha = pitch - np.arctan2(u_p, u_t)
+        cl, cd = airfoil_coefficients(airfoil, number, alpha, ac.options.interpolation)
+        if shares is not None and has_late_separation(rotor):
+            share = shares[len(loads)]
+            cl, staying = late_lift(airfoil, number, alpha, cl, share)
+            rates.append(speed / (4 * chord) * (staying - share))
+        elif shares is not None:
+            rates.append(0.0)
         lifting_edge = rotor.tip_loss * rotor.radius - rotor.hinge_offset
         cl = cl * np.clip((lifting_edge - inner) / ds, 0.0, 1.0)
         if rotor.tip_loss_model == "prandtl":
@@ -642,7 +737,7 @@ def swept_force(ac, blade, inner, outer, pitch, velocity):
     u_across, u_up = velocity @ across, velocity @ up
     speed = np.hypot(u_across, u_up)
     chord = along_blade(rotor, "chord", s)
-    airfoil = ac.airfoils[airfoil_at(rotor, (rotor.hinge_offset + s) / rotor.radius)]
+    airfoil = airfoil_at(ac, rotor, (rotor.hinge_offset + s) / rotor.radius)
     cl, cd = airfoil_coefficients(
         airfoil,
         speed / air.speed_of_sound
@@ -694,7 +789,28 @@ def measured_flow(lambda0, mu_z):
     return lambda0 * curve(at), curve(at) - at * curve(at, 1)
 
 
-def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_inflow, through=0.0):
+def axial_flow(rotor, lambda0, mu_z):
+    """Return the axial flow through a disc, over the tip speed, and its slope by lambda0."""
+    if rotor.descent == "measured" and 0.0 < mu_z / (lambda0 or np.inf) < WINDMILL:
+        return measured_flow(lambda0, mu_z)
+    return lambda0 - mu_z, 1.0
+
+
+def ring_of(ac, rotor, lambda0, air_velocity_hub, through, noise):
+    """Return what the noise of a vortex ring takes of the thrust coefficient, and the part of lambda0 that takes it."""
+    tip_speed = inflow_speed(rotor) * rotor.radius
+    u = np.asarray(rotor.shaft_direction, dtype=float)
+    mu_z = -u @ air_velocity_hub / tip_speed - through
+    edgewise = np.linalg.norm(air_velocity_hub - (u @ air_velocity_hub) * u) / tip_speed
+    total = np.hypot(edgewise, axial_flow(rotor, lambda0, mu_z)[0])
+    if getattr(rotor, "ring_unsteadiness", 0.0) == 0.0 or lambda0 * total <= 0.0:
+        return 0.0, 0.0
+    hover = np.sqrt(lambda0 * total)  # sqrt(C_T / 2) of the steady inflow
+    missing = 2 * hover**2 * ring_shares(noise, rotor, mu_z / hover, edgewise / hover)
+    return missing, added_inflow(ac, rotor, missing)
+
+
+def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_inflow, through=0.0, missing=0.0):
     """Return d/dt of lambda0, lambdas, lambdac [1/s], Peters and HaQuang's three states.
 
     Without cyclic inflow the equation left is momentum theory's, M00 lambda0'/Omega + V_T lambda0 / L00 =
@@ -714,6 +830,8 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
     cyclic_inflow : bool
     through : float
         What other rotors add to the flow through the disc, over the tip speed.
+    missing : float
+        What the noise of the vortex ring takes of the thrust coefficient.
 
     Returns
     -------
@@ -740,11 +858,9 @@ def inflow_rate(ac, rotor, blades, air_loads, inflow, air_velocity_hub, cyclic_i
     mu_x, mu_y = x_hub @ met / tip_speed, y_hub @ met / tip_speed
     mu_z = -u @ air_velocity_hub / tip_speed - through
     lambda0 = inflow[0]
-    lam = lambda0 - mu_z
     mu2 = mu_x**2 + mu_y**2
-    slope = 1.0  # of the axial flow by lambda0
-    if rotor.descent == "measured" and 0.0 < mu_z / (lambda0 or np.inf) < WINDMILL:
-        lam, slope = measured_flow(lambda0, mu_z)
+    lam, slope = axial_flow(rotor, lambda0, mu_z)
+    coefficients[0] += missing
     v_t = np.sqrt(mu2 + lam**2 + INFLOW_SPEED_FLOOR**2)
     v_m = (mu2 + lam * (lam + lambda0 * slope)) / v_t
     x_c = mu_x / (v_t + abs(lam))
@@ -791,6 +907,10 @@ class Instant(NamedTuple):
     state: object  # `split_state`
     hub_velocities: list  # over rotors, relative to the air, body axes [m/s]
     washes: list  # over rotors, see `plain_interference`
+    wake_rates: list  # over rotors, of arrays (N_b, 2), of the blades' parts of the circulation [1/s]
+    wake_washes: list  # over rotors, of lists over blades: wash of the blade's wake at the tip [m/s]
+    missing: list  # over rotors, of the thrust coefficient in a vortex ring
+    separation_rates: list  # over rotors, over blades, of lists over sections [1/s]
     conings: list  # over rotors, of pairs: mean flap angle [rad] and rate [rad/s]
 
 
@@ -1069,7 +1189,7 @@ def solve_accelerations(instant):
     return unknowns - np.linalg.solve(matrix, residual(instant, unknowns))
 
 
-def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True, local_air=None):
+def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True, local_air=None, ring_noise=None):
     """Return the `Instant` of a state; arguments as in `plain_derivative`."""
     state = split_state(ac, x, lead_lag, cyclic_inflow)
     attitude = rotation_matrix(state.quaternion)
@@ -1077,21 +1197,38 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True, loc
     blades = make_blades(ac, state, psi, swash)
     part_force, part_moment = part_loads(ac, air_velocity, state.rate, state.inflow)
     hub_velocities = [air_velocity + cross(state.rate, np.asarray(rotor.hub, dtype=float)) for rotor in ac.rotors]
+    gradients = [None] * len(ac.rotors)
+    if local_air is not None:
+        hub_velocities = [own - gust for own, (gust, _) in zip(hub_velocities, local_air, strict=True)]
+        gradients = [disc_gradient(rotor, slope) for rotor, (_, slope) in zip(ac.rotors, local_air, strict=True)]
     washes = all_washes(ac, state.inflow, hub_velocities)
     if getattr(getattr(ac, "ground", None), "effect", "none") != "none":
         taken = ground_washes(ac, state, attitude, hub_velocities)
         washes = [wash._replace(blades=wash.blades + own) for wash, own in zip(washes, taken, strict=True)]
     if stands_on_ground(ac):
-        ground = contact(ac, np.asarray(x), attitude)
+        ground = contact(ac, np.asarray(x)[: len(x) - section_count(ac)], attitude)
         part_force, part_moment = part_force + ground[0], part_moment + ground[1]
-    gradients = [None] * len(ac.rotors)
-    if local_air is not None:
-        hub_velocities = [own - gust for own, (gust, _) in zip(hub_velocities, local_air, strict=True)]
-        gradients = [disc_gradient(rotor, slope) for rotor, (_, slope) in zip(ac.rotors, local_air, strict=True)]
-    air_loads = []
+    missing = [0.0] * len(ac.rotors)
+    if ring_noise is not None:
+        for j, (rotor, noise) in enumerate(zip(ac.rotors, ring_noise, strict=True)):
+            missing[j], added = ring_of(ac, rotor, state.inflow[j][0], hub_velocities[j], washes[j].through, noise)
+            washes[j] = washes[j]._replace(blades=washes[j].blades + np.array([added, 0.0, 0.0]))
+    air_loads, wake_rates, wake_washes, separation_rates = [], [], [], []
     for j, rotor in enumerate(ac.rotors):
         met, inflow = met_velocity(rotor, hub_velocities[j]), state.inflow[j] + washes[j].blades
-        air_loads.append([blade_air_loads(ac, blade, swash[j], inflow, met, gradients[j]) for blade in blades[j]])
+        given, wakes = (swash[j], inflow, met), [(np.zeros(0), 0.0)] * rotor.blades
+        if has_wake(rotor):
+            parts = multiblade_matrix(rotor.blades, psi[j]) @ state.wake[j].T
+            pairs = zip(blades[j], parts, strict=True)
+            wakes = [circulation(ac, blade, *given, own, gradients[j]) for blade, own in pairs]
+        wake_rates.append(np.array([rates for rates, _ in wakes]))
+        wake_washes.append([wash for _, wash in wakes])
+        shares, rates = state.separation[j] or [None] * rotor.blades, [[] for _ in range(rotor.blades)]
+        rows = zip(blades[j], wakes, shares, rates, strict=True)
+        air_loads.append(
+            [blade_air_loads(ac, blade, *given, gradients[j], wash, own, out) for blade, (_, wash), own, out in rows]
+        )
+        separation_rates.append(rates)
     return Instant(
         ac=ac,
         lead_lag=lead_lag,
@@ -1106,6 +1243,10 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True, loc
         state=state,
         hub_velocities=hub_velocities,
         washes=washes,
+        wake_rates=wake_rates,
+        wake_washes=wake_washes,
+        missing=missing,
+        separation_rates=separation_rates,
         conings=[(flap[0], rate[0]) for flap, rate in zip(state.flap, state.flap_rate, strict=True)],
     )
 
@@ -1117,7 +1258,7 @@ def disc_gradient(rotor, slope):
     return np.stack([met_velocity(rotor, column) for column in within.T], axis=1)
 
 
-def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True, local_air=None):
+def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True, local_air=None, ring_noise=None):
     """Return the derivative of the state and the rotors' loads.
 
     Parameters
@@ -1136,6 +1277,8 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True,
     local_air : list of (array of shape (3,), array of shape (3, 3)), or None
         For each rotor the velocity of the air at the hub less that at the c.g. [m/s], and its gradient [1/s], body
         axes.
+    ring_noise : array of shape (n_rotors,), or None
+        Of vortex rings, of variance 1.
 
     Returns
     -------
@@ -1149,7 +1292,7 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True,
         and ``lag_acceleration``, lists of (N_b,) [rad/s^2], of the blades in the rotating frame.
     """
     state = split_state(ac, x, lead_lag, cyclic_inflow)
-    instant = make_instant(ac, x, swash, psi, wind, lead_lag, cyclic_inflow, local_air)
+    instant = make_instant(ac, x, swash, psi, wind, lead_lag, cyclic_inflow, local_air, ring_noise)
     attitude = rotation_matrix(state.quaternion)
     om = state.rate
     origin_acceleration, body_rate_dot, flap_dd, lag_dd = unpack(instant, solve_accelerations(instant))
@@ -1157,7 +1300,7 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True,
     w, vector = state.quaternion[0], state.quaternion[1:]
     quaternion_rate = 0.5 * np.concatenate([[-vector @ om], w * om + cross(vector, om)])
 
-    flap_rates, flap_accelerations, lag_rates, lag_accelerations, inflow_rates = [], [], [], [], []
+    flap_rates, flap_accelerations, lag_rates, lag_accelerations, inflow_rates, wake_rates = [], [], [], [], [], []
     loads = {"thrust": [], "torque": [], "force": [], "moment": [], "duct": []}
     for j, rotor in enumerate(ac.rotors):
         transform = multiblade_matrix(rotor.blades, psi[j])
@@ -1181,8 +1324,12 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True,
                 instant.hub_velocities[j],
                 cyclic_inflow,
                 instant.washes[j].through,
+                instant.missing[j],
             )
         )
+        if has_wake(rotor):
+            own = instant.wake_rates[j] - transform_d @ state.wake[j].T
+            wake_rates.append(np.linalg.solve(transform, own).T.ravel())
         force, moment = hub_loads(instant, j, origin_acceleration, body_rate_dot, flap_dd[j], lag_dd[j])
         u = np.asarray(rotor.shaft_direction, dtype=float)
         loads["thrust"].append(aerodynamic_thrust(instant, j))
@@ -1206,6 +1353,8 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True,
             *lag_rates,
             *lag_accelerations,
             *inflow_rates,
+            *wake_rates,
+            *section_rates(ac, instant.separation_rates),
         ]
     )
     loads = {name: np.array(values) for name, values in loads.items()}
@@ -1215,6 +1364,17 @@ def plain_derivative(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True,
 # ------------------------------------------------------------------------------------------------------------
 # Integrals of the motion
 # ------------------------------------------------------------------------------------------------------------
+
+
+def section_rates(ac, rates):
+    """Return the rates of all sections in their places; empty without late separation."""
+    if not section_count(ac):
+        return []
+    found = np.zeros(section_count(ac))
+    for j, of_rotor in enumerate(rates):
+        for k, own in enumerate(of_rotor):
+            found[section_places(ac, j, k)] = own
+    return [found]
 
 
 def _blade_points(ac, state, psi, swash=None):
@@ -1410,5 +1570,7 @@ def random_state(ac, rng, size=1.0):
             size * rng.normal(scale=0.1, size=count),
             size * rng.normal(scale=10.0, size=count),
             *inflow,
+            *(size * rng.normal(scale=0.05, size=2 * rotor.blades) for rotor in ac.rotors if has_wake(rotor)),
+            *([rng.uniform(size=ac.layout.separations)] if any(map(has_late_separation, ac.rotors)) else []),
         ]
     )

@@ -1,6 +1,6 @@
 """Random aircraft with every kind of key that an aircraft file may have: those of `random_aircraft` and options on top.
 
-One to eight rotors of three to seven blades. Each option is drawn by itself, so that any two of them meet in some
+One to eight rotors of two to seven blades. Each option is drawn by itself, so that any two of them meet in some
 aircraft of a fleet.
 """
 
@@ -13,11 +13,20 @@ from random_aircraft import GRAVITY, KINDS, random_conditions, random_data
 
 from sbs_sim import Aircraft
 from sbs_sim.aircraft.atmosphere import standard_air
+from sbs_sim.aircraft.declaration import schema_of
+from sbs_sim.aircraft.description import Description
 from sbs_sim.errors import AircraftError
 
+PAPER = "no law is kept where blades and body move as the paper has it"
+NEVER_DRAWN = {  # of `schema_keys`
+    "description": "text",
+    **dict.fromkeys(("options.coupling = paper", "options.hub_moment = paper"), PAPER),
+    "options.flap_inertia = axis_to_tip": PAPER,
+}
 ALL_KINDS = (*KINDS, "single", "compound", "multirotor", "stand")
 CALM = 0.5  # share of an option that is drawn
-MOST_BLADES, FEWEST_BLADES = 7, 3
+MOST_BLADES, FEWEST_BLADES = 7, 3  # and two, see `_blade_pairs`
+MOST_WASHED = 4  # rotors with wash on one another: each pair of them has a table
 WASH = {"skew_deg": [0.0, 40.0, 80.0], "down": [1.5, 1.8, 0.4], "aft": [0.0, 0.5, 0.2]}
 RENAMED = {"collective": "lever", "lateral_cyclic": "stick", "longitudinal_cyclic": "push"}
 HELD = {"vane": {"range_deg": [-5.0, 5.0], "held_deg": 1.0}}
@@ -32,6 +41,9 @@ def equipped_flights(seed: int, i: int) -> tuple[str, Aircraft, dict[str, dict[s
 
 def equipped_data(kind: str, rng: np.random.Generator) -> dict[str, Any]:
     """Mapping of an aircraft file of a kind, drawn again until it is physically possible."""
+    (newer,) = rng.spawn(1)  # for draws of their own, which leave the others as they are
+    (newest,) = newer.spawn(1)
+    (latest,) = newest.spawn(1)
     while True:
         data = _based(kind, rng)
         for rotor in data["rotors"]:
@@ -40,10 +52,14 @@ def equipped_data(kind: str, rng: np.random.Generator) -> dict[str, Any]:
         for option in (_air, _surfaces, _fuselage, _controls, _drives):
             if rng.random() < CALM:
                 option(data, rng)
+        for option in NEWER:
+            option(data, newer)
+        _unsteadiness(data, newest)
         try:
             Aircraft.from_dict(data)
         except AircraftError:
             continue
+        _late_stall(data, latest)
         return data
 
 
@@ -199,6 +215,260 @@ def _offset_blades(rotor: dict[str, Any], rng: np.random.Generator) -> None:
         rotor["lag_stop"] = {"range_deg": ends, "stiffness": inertia * speed**2, "damping": 0.1 * inertia * speed}
 
 
+# --- what came later, with draws of its own --------------------------------------------------------------------------
+
+
+def _blade_pairs(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Rotors of two blades, of which some teeter."""
+    if rng.random() > 0.15:
+        return
+    for rotor in data["rotors"]:
+        if rng.random() < 0.7:
+            _take_two_blades(rotor, rng)
+
+
+def _take_two_blades(rotor: dict[str, Any], rng: np.random.Generator) -> None:
+    """Two blades with the area, mass and stiffness of those that there were."""
+    share = rotor["blades"] / 2
+    rotor["blades"] = 2
+    rotor.pop("blade_lag_damping", None)
+    for key in ("root", "tip", "values"):
+        if key in rotor["chord"]:
+            rotor["chord"][key] = (share * np.array(rotor["chord"][key])).tolist()
+    for key in ("blade_mass", "blade_inertia", "flap_spring", "lag_spring", "lag_damping"):
+        if key in rotor:
+            rotor[key] *= share
+    if "lag_damper" in rotor:
+        rotor["lag_damper"]["damping"] *= share
+    for key in ("stiffness", "damping"):
+        if "lag_stop" in rotor:
+            rotor["lag_stop"][key] *= share
+    if rng.random() < CALM:
+        _teeter(rotor, rng)
+
+
+def _teeter(rotor: dict[str, Any], rng: np.random.Generator) -> None:
+    """One flap hinge at the axis, where the lag hinges need springs: without them no torque would reach the blades."""
+    rotor |= {"flap_hinge": "teetering", "hinge_offset": 0.0, "flap_hinge_offset": 0.0}
+    rotor["flap_rest_deg"] = float(rng.uniform(0.0, 5.0))
+    inertia = rotor["blade_mass"] * rotor["radius"] ** 2 / 3
+    rotor["lag_spring"] = inertia * (rotor["speed_rpm"] * math.pi / 30) ** 2 * float(rng.uniform(0.3, 2.0))
+    rotor.pop("lag_stop", None)
+    if rng.random() < CALM:
+        rotor["undersling"] = rotor["radius"] * float(rng.uniform(0.0, 0.03))
+
+
+def _sections(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Mass along the span, drag that is added, outboard airfoils, losses at the tip, drag along the span."""
+    straight = not any({"quarter_chord", "chordwise_cg", "undersling"} & rotor.keys() for rotor in data["rotors"])
+    losses, oblique = straight and rng.random() < 0.25, straight and rng.random() < 0.25
+    for rotor in data["rotors"]:
+        if rng.random() < 0.25:
+            _distribute_mass(rotor, rng)
+        if rng.random() < 0.25:
+            rotor["drag_increment"] = float(rng.uniform(0.0, 0.005))
+        if rng.random() < 0.15:
+            rotor["outboard_airfoils"] = {"stations": [float(rng.uniform(0.5, 0.9))], "values": [rotor["airfoil"]]}
+            rotor["airfoil"] = "naca0012" if rotor["airfoil"] != "naca0012" else "linear_573"
+        if losses and rng.random() < 0.7:
+            rotor |= {"tip_loss_model": "prandtl", "tip_loss": 1.0}
+        if oblique and rng.random() < 0.7:
+            rotor["profile_drag"] = "oblique"
+        if rng.random() < 0.25 and "duct" not in rotor and rotor["duct_expansion"] == 0.5:
+            rotor |= {"descent": "measured", "induced_power_factor": 1.1}
+
+
+def _unsteadiness(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Circulation that follows the flow late, and thrust that fluctuates in vortex rings."""
+    for rotor in data["rotors"]:
+        if rng.random() < 0.2 and rotor["blades"] > 2:
+            rotor["unsteady_airfoil"] = "jones"
+        if rng.random() < 0.5 and rotor.get("descent") == "measured":
+            rotor["ring_unsteadiness"] = float(rng.uniform(0.0, 0.3))
+
+
+def _late_stall(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Separation that follows the flow late, where no blade has offsets, which goes without it."""
+    if any(rotor.has_offsets for rotor in Aircraft.from_dict(data).rotors):
+        return
+    for rotor in data["rotors"]:
+        if rng.random() < 0.3:
+            rotor["dynamic_stall"] = "separation"
+
+
+def _distribute_mass(rotor: dict[str, Any], rng: np.random.Generator) -> None:
+    """Mass and c.g. about those that there were, with a mass at the tip."""
+    start = rotor["hinge_offset"] / rotor["radius"]
+    mean = rotor.pop("blade_mass") / (rotor["radius"] - rotor["hinge_offset"])
+    del rotor["blade_cg"]
+    rotor.pop("blade_inertia", None)
+    values = (mean * np.array([1.2, 1.0, 0.8]) * rng.uniform(0.9, 1.1, 3)).tolist()
+    table = {"stations": [start, 0.5 + 0.5 * start, 1.0], "values": values}
+    rotor["mass_distribution"] = table | {"tip_mass": 0.05 * mean * rotor["radius"] * float(rng.random())}
+
+
+def _ducts(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Other exits, lips and losses of the ducts that there are."""
+    for rotor in data["rotors"]:
+        if "duct" not in rotor or rng.random() > CALM:
+            continue
+        low = {
+            "exit_area": 0.45,
+            "turning": 0.0,
+            "ram_recovery": 0.0,
+            "lip_arm": -0.2 * rotor["radius"],
+            "lip_stall": 0.5,
+        }
+        high = {
+            "exit_area": 1.2,
+            "turning": 1.0,
+            "ram_recovery": 1.0,
+            "lip_arm": 0.4 * rotor["radius"],
+            "lip_stall": 5.0,
+        }
+        keys = [key for key in low if key == "exit_area" or rng.random() < 0.7]
+        rotor["duct"] = {key: float(rng.uniform(low[key], high[key])) for key in keys}
+
+
+def _schedules(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Shares in swashplate angles that change with the airspeed: of a control, or of none."""
+    for rotor in data["rotors"]:
+        if rng.random() > 0.15:
+            continue
+        tip_speed = rotor["speed_rpm"] * math.pi / 30 * rotor["radius"]
+        speeds = (tip_speed * np.array([0.02, 0.1, 0.25])).tolist()
+        angle = str(rng.choice(["collective", "lateral_cyclic", "longitudinal_cyclic"]))
+        angles = {"angle": angle, "airspeed": speeds, "offset_deg": rng.uniform(-1.0, 1.0, 3).tolist()}
+        control = str(rng.choice(sorted(data["controls"])))
+        size = _size(data["controls"][control])
+        factors = {
+            "angle": angle,
+            "control": control,
+            "airspeed": speeds,
+            "factor": rng.uniform(-size, size, 3).tolist(),
+        }
+        rotor["schedule"] = [angles, factors] if rng.random() < CALM else [factors]
+
+
+def _pilot(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Axes of the sticks, a held control that is no angle, and a speed of sound."""
+    if rng.random() < 0.25:
+        names = [name for name, control in data["controls"].items() if "axis" not in control]
+        axes = rng.permutation(["roll", "pitch", "yaw", "none", "none", "none"]).tolist()
+        for name, axis in zip(names, axes, strict=False):
+            data["controls"][name]["axis"] = axis
+    if rng.random() < 0.25:
+        data["controls"]["trim_wheel"] = {
+            "range": [-10.0, 10.0],
+            "unit": "clicks",
+            "held": float(rng.uniform(-2.0, 2.0)),
+        }
+        data["rotors"][0]["mixing"]["longitudinal_cyclic"]["trim_wheel"] = 2e-3
+    if rng.random() < 0.25 and "altitude" not in data["environment"]:
+        data["environment"]["speed_of_sound"] = float(rng.uniform(300.0, 360.0))
+
+
+def _size(control: dict[str, Any]) -> float:
+    """Factor of a control on an angle that is a fifth of it, or some degrees over its range."""
+    return 0.2 if "range_deg" in control else 1e-3
+
+
+def _moving_surfaces(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Controls that move surfaces, and coefficients of their own."""
+    for surface in data["body"].get("surfaces", ()):
+        if rng.random() < CALM:
+            control = str(rng.choice(sorted(data["controls"])))
+            size = _size(data["controls"][control])
+            surface["mixing"] = {"incidence": {control: float(rng.uniform(-size, size))}}
+            surface |= {"incidence_range_deg": [-20.0, 20.0], "incidence_rate_deg": 60.0}
+        if rng.random() < CALM and "polar" not in surface:
+            ends = {"zero_lift_angle_deg": (-4.0, 4.0), "lift_slope": (2.0, 6.0), "max_lift": (0.8, 1.4)}
+            ends |= {"zero_lift_drag": (0.005, 0.02), "span_efficiency": (0.7, 1.0), "dynamic_pressure": (0.6, 1.0)}
+            surface |= {key: float(rng.uniform(*pair)) for key, pair in ends.items() if rng.random() < 0.7}
+
+
+def _tables(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Tables of the fuselage over both angles, and the offsets of the blades in the other of their two ways."""
+    fuselage = data["body"].get("fuselage")
+    if fuselage and rng.random() < CALM:
+        area = max(fuselage["drag"]["alpha"])
+        for name in ("drag", "side", "lift", "roll", "pitch", "yaw"):
+            scale = 0.1 * area * (1.0 if name in ("drag", "side", "lift") else data["rotors"][0]["radius"])
+            for key, shape in (("alpha", 5), ("beta", 5), ("grid", (5, 5))):
+                if rng.random() < 0.4:
+                    fuselage.setdefault(name, {})[key] = (scale * rng.uniform(0.0, 1.0, shape)).tolist()
+    for rotor in data["rotors"]:
+        if "quarter_chord" in rotor and rng.random() < CALM:
+            inner, outer = rotor["quarter_chord"]["values"][::2]
+            rotor["quarter_chord"] = {"root": inner, "tip": outer}
+            rotor["chordwise_cg"] = {"stations": [0.2, 0.8, 1.0], "values": [inner, inner, outer]}
+
+
+def _ground(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """A ground below, level or not, with its effect, and with points that touch it."""
+    if rng.random() > 0.3:
+        return
+    radius, weight = data["rotors"][0]["radius"], data["body"]["mass"] * GRAVITY
+    ground: dict[str, Any] = {"effect": str(rng.choice(["none", "cheeseman_bennett", "measured"]))}
+    lowest = max(0.0, *(rotor["hub"][2] for rotor in data["rotors"]))
+    if rng.random() < CALM and "stand" not in data["body"]:
+        ground["contact"] = "contact"
+        data["contact_points"] = _legs(radius, weight, lowest + 0.1 * radius, rng)
+        lowest += 0.1 * radius
+    if rng.random() < 0.4:
+        ground |= {"slope_deg": float(rng.uniform(0.0, 8.0)), "slope_heading_deg": float(rng.uniform(-180.0, 180.0))}
+    data["ground"] = ground | {"altitude": -lowest - radius * float(rng.uniform(0.5, 3.0))}
+
+
+def _legs(radius: float, weight: float, down: float, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """Three or four points, skids or wheels."""
+    count, points = int(rng.integers(3, 5)), []
+    stiffness = weight / (count * 0.02 * radius)
+    for k in range(count):
+        angle = 2.0 * math.pi * (k + 0.5) / count
+        point: dict[str, Any] = {
+            "name": f"leg {k + 1}",
+            "position": [0.4 * radius * math.cos(angle), 0.3 * radius * math.sin(angle), down],
+            "stiffness": stiffness,
+            "damping": 0.3 * math.sqrt(stiffness * weight / GRAVITY / count),
+            "friction": float(rng.uniform(0.3, 1.0)),
+        }
+        if rng.random() < CALM:
+            point |= {"rolling": [1.0, 0.0, 0.0], "rolling_friction": 0.03}
+        if rng.random() < CALM:
+            point |= {
+                "side_stiffness": 0.5 * stiffness,
+                "side_damping": 0.4 * point["damping"],
+                "onset": 0.002 * radius,
+            }
+        points.append(point)
+    return points
+
+
+def _options(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Interpolation, number of elements, wash of the rotors on one another, and what limits and moves engines."""
+    options = data["options"]
+    if rng.random() < CALM:
+        options["interpolation"] = "smooth"
+    if rng.random() < 0.25:
+        options["elements"] = int(rng.integers(8, 40))
+    if 1 < len(data["rotors"]) <= MOST_WASHED and rng.random() < 0.25:
+        options["interference"] = "skewed_wake"
+    for drive in data.get("drives", ()):
+        engine = drive.get("engine", {})
+        if engine and rng.random() < 0.25:
+            speeds = {rotor["name"]: rotor["speed_rpm"] for rotor in data["rotors"]}
+            engine["max_power"] = (
+                engine["max_torque"] * speeds[drive["rotors"][0]] * math.pi / 30 * rng.uniform(0.8, 1.2)
+            )
+        if engine and rng.random() < 0.25:
+            control = str(rng.choice(sorted(data["controls"])))
+            factor = _size(data["controls"][control]) * float(rng.uniform(-1.0, 1.0))
+            drive.setdefault("mixing", {})["throttle"] = {control: factor}
+
+
+NEWER = _blade_pairs, _sections, _ducts, _schedules, _moving_surfaces, _tables, _ground, _options, _pilot
+
 # --- air and body -------------------------------------------------------------------------------------------------
 
 
@@ -338,3 +608,37 @@ def _drive(rotors: list[dict[str, Any]], power: float, count: int, rng: np.rando
     else:
         drive["engine"]["throttle"] = float(rng.uniform(0.3, 0.9))
     return drive
+
+
+# --- which keys there are -----------------------------------------------------------------------------------------
+
+
+def schema_keys(schema: dict[str, Any] | None = None, path: str = "") -> set[str]:
+    """Paths of all keys and choices of an aircraft file, lists without their numbers, names of one's own as *."""
+    schema = schema_of(Description) if schema is None else schema
+    if "items" in schema and "properties" in schema["items"]:
+        return schema_keys(schema["items"], path)
+    found = {f"{path} = {value}" for value in schema.get("enum", ()) if value != schema.get("default")}
+    named = schema.get("additionalProperties")
+    children = schema.get("properties", {}) | ({"*": named} if isinstance(named, dict) else {})
+    for key, child in children.items():
+        found |= schema_keys(child, f"{path}.{key}".removeprefix("."))
+    return found or {path}
+
+
+def drawn_keys(data: Any, known: set[str], path: str = "") -> set[str]:
+    """Those of `schema_keys` that are in a mapping of an aircraft file."""
+    if isinstance(data, dict):
+        return set().union(*(drawn_keys(value, known, _child(path, key, known)) for key, value in data.items()))
+    if isinstance(data, list) and data and isinstance(data[0], dict):
+        return set().union(*(drawn_keys(item, known, path) for item in data))
+    values = data if isinstance(data, list) else [data]
+    return {path, *(f"{path} = {value}" for value in values)} & known
+
+
+def _child(path: str, key: str, known: set[str]) -> str:
+    """Path of a key, or of any name where the file has names of its own."""
+    own, any_name = (f"{path}.{name}".removeprefix(".") for name in (key, "*"))
+    return (
+        any_name if any(one == any_name or one.startswith((f"{any_name}.", f"{any_name} ")) for one in known) else own
+    )

@@ -224,7 +224,7 @@ def _at_common_angles(polars: list[Polar], remarks: list[str]) -> list[Polar]:
 
 
 def at_reynolds(table: AirfoilTable, reynolds: float) -> AirfoilTable:
-    """Table at one Reynolds number, linear between those of the table.
+    """Table at one Reynolds number, linear between those of the table; one for all numbers is that at any.
 
     Raises
     ------
@@ -232,8 +232,11 @@ def at_reynolds(table: AirfoilTable, reynolds: float) -> AirfoilTable:
         The table is not over the Reynolds number, or does not have it.
     """
     low, high = table.numbers[0], table.numbers[-1]
+    if table.axis == "reynolds" and low == high == 0.0:
+        return table
     if table.axis != "reynolds" or not low <= reynolds <= high:
-        allowed = f"{low:g} to {high:g}" if table.axis == "reynolds" else "none, the table is over the Mach number"
+        span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        allowed = span if table.axis == "reynolds" else "none, the table is over the Mach number"
         raise AirfoilError(f"Reynolds number {reynolds:g}: allowed is {allowed}")
     cl, cd = (
         np.array([[np.interp(reynolds, table.numbers, column) for column in values.T]])

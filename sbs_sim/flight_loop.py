@@ -27,6 +27,8 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.flight.records import Event, Snapshot
 from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.stitched import StitchedModel
+from sbs_sim.flight.stitched_simulation import FULL, STITCHED
 from sbs_sim.model.wind import Wind
 
 QUEUE_LENGTH = 100  # snapshots between the flight and their reader: one second at 100 Hz
@@ -218,6 +220,10 @@ class FlightLoop:
         """Put the aircraft into another state and clear a fault; time goes on."""
         self.call(lambda: self._reset(state, swashplate))
 
+    def change_state(self, make: Callable[[np.ndarray], ArrayLike]) -> None:
+        """Put the aircraft into the state that `make` gives for the present one, under the same swashplate angles."""
+        self.call(lambda: self._reset(make(self._simulation.state.copy()), self._simulation.swashplate))
+
     def set_wind(self, make: Callable[[Snapshot], Wind]) -> None:
         """Set the wind that `make` gives for the present instant, from the next tick on."""
         self.call(lambda: self._set_wind(make))
@@ -249,6 +255,16 @@ class FlightLoop:
         return self._simulation.time
 
     @property
+    def playing(self) -> bool:
+        """False while it is paused."""
+        return self._playing
+
+    @property
+    def report_steps(self) -> int:
+        """Integration steps from one report with a snapshot to the next."""
+        return self._simulation.steps_per_tick
+
+    @property
     def step_size(self) -> float:
         """Integration step [s]."""
         return self._simulation.step_size
@@ -257,6 +273,16 @@ class FlightLoop:
     def method(self) -> str:
         """Method of integration."""
         return str(self._simulation.options["method"])
+
+    @property
+    def stitched(self) -> StitchedModel | None:
+        """The stitched model that flies, or None."""
+        return self._simulation.stitched
+
+    @property
+    def model(self) -> str:
+        """Which model flies: "full" or "stitched"."""
+        return STITCHED if self._simulation.stitched is not None else FULL
 
     @property
     def pace(self) -> float:

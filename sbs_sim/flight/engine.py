@@ -97,16 +97,23 @@ class Engine:
             exponential = R.make_exponential([], [[]] * n, width)
         self.tick = R.make_tick(self.work, int(STAGES[method]), exponential)
         self.size, self.n = self.tick.stage.shape
-        self._plain_wind, self._plain_space = self.tick.wind, self.tick.space
+        self._plain_wind, self._plain_space, self._no_gusts = self.tick.wind, self.tick.space, self.work.gusts
         self.rotors = len(self.tick.psi)
 
     def set_space(self, spaces: Sequence[R.Space | None]) -> None:
         """Fly through air that is not the same everywhere: of each flight, all or none; the last is for the others."""
         if spaces[0] is None:
             self.tick = self.tick._replace(wind=self._plain_wind, space=self._plain_space)
+            self.work = self.work._replace(gusts=self._no_gusts)
             return
         space = joined_spaces(self.model, [one for one in spaces if one is not None], self.n)
         self.tick = self.tick._replace(wind=self.memory(air_rows(self.model)), space=space)
+        self.work = self.work._replace(gusts=space.elements)
+
+    @property
+    def is_local(self) -> bool:
+        """True for air that is not the same everywhere."""
+        return len(self.tick.space.parameters) > 0
 
     @property
     def air_rows(self) -> int:
@@ -168,9 +175,8 @@ class Engine:
         """
         outputs = len(owners) + SPECIFIC_FORCE_SIZE + R.LOAD_SIZE * self.rotors
         all_owners = np.append(owners, np.full(rigging.shape[1] - 1, self.rotors))
-        if self.model.switches["interference"][0]:  # the inflow of a rotor changes the blades of all
-            for first in self.model.rotors["inflow"] - BODY_SIZE + LINEAR_BODY_SIZE:
-                all_owners[first : first + len(INFLOW_NAMES)] = self.rotors
+        for j, first in enumerate(self.model.rotors["inflow"] - BODY_SIZE + LINEAR_BODY_SIZE):
+            all_owners[first : first + len(INFLOW_NAMES)] = inflow_owner(self.model, j)
         found = np.zeros((len(psi), len(point), outputs))
         jacobian(
             *(self.code.derivative, self.model, point, rigging, steps, all_owners, psi, self.work, self.tick),
@@ -188,6 +194,11 @@ class Engine:
         for lane in range(self.n):
             made[..., lane] = arrays[min(lane, len(arrays) - 1)]
         return made
+
+
+def inflow_owner(model: R.Model, rotor: int) -> int:
+    """Rotor whose blades alone the inflow of a rotor changes: its own, or with interference all, see `jacobian`."""
+    return len(model.rotors) if model.switches["interference"][0] else rotor
 
 
 def points_engine(model: R.Model) -> Engine:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -22,6 +22,7 @@ from sbs_sim.model.frames import down_of
 from sbs_sim.model.integrate import FLYING
 from sbs_sim.model.packing import lane_count, side_by_side
 from sbs_sim.model.records import LOAD_SIZE
+from sbs_sim.model.wind_columns import WIND_SIZE
 from sbs_sim.model.working_state import WORKING_SIZE
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ class Flown(NamedTuple):
         Complete ticks that were flown.
     fault : SimulationError or None
         Why the flight ended before its last tick; it cannot go on then.
+    air : ndarray, shape (n, WIND_SIZE)
+        Air of the ticks that begin with the rows; without them where the model has no rotors.
     """
 
     rows: Rows
@@ -53,6 +56,7 @@ class Flown(NamedTuple):
     watched: NDArray[np.int64]
     ticks: int
     fault: SimulationError | None
+    air: Array = np.zeros((0, WIND_SIZE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +110,23 @@ class Formation:
         ----------
         swashplates : sequence of ndarray, shape (m, n_rows, 3) each
             Angles of each tick of each flight [rad], m = ticks or one more, which is then in force at the end.
+        ticks, every, loaded :
+            See `fly_by`.
+        """
+        count = len(swashplates[0])
+        angles = self._engine.lanes([own.reshape(count, -1) for own in swashplates])
+        return self.fly_by(fly, angles, ticks, every, loaded)
+
+    def fly_by(self, way: Callable[..., None], angles: Array, ticks: int, every: int, loaded: bool) -> list[Flown]:
+        """Fly many ticks in some way.
+
+        Parameters
+        ----------
+        way : callable
+            Takes the arguments of `sbs_sim.model.fly.fly` and does what that does.
+        angles : ndarray, shape (m, 3 n_rows, n)
+            Of each tick of each flight [rad], m = ticks or one more, which is then in force at the end; also memory for
+            them, where it is the way that finds them.
         ticks : int
         every : int
             Ticks from one row of the result to the next, counted from the start of the flight.
@@ -117,7 +138,7 @@ class Formation:
         list of Flown
             Of each flight. Flights that ended in a call before have no rows.
         """
-        engine, count, flew = self._engine, len(swashplates[0]), (self._failed == FLYING).tolist()
+        engine, count, flew = self._engine, len(angles), (self._failed == FLYING).tolist()
         code = engine.code
         # one that still flies: those that have ended stay where and when that was
         lead = flew.index(True) if any(flew[: len(self.simulations)]) else 0
@@ -133,10 +154,10 @@ class Formation:
         loads = engine.memory(len(recorded), LOAD_SIZE * engine.rotors)
         working = engine.memory(len(watched), engine.rotors, WORKING_SIZE)
         air = self._air([plan.wind for plan in plans])
-        fly(
+        way(
             *(code.advance, code.derivative, code.working_state, engine.model, x, self._start, step),
             *(first.steps_per_tick, first.step_size, first.method, self._bounds, engine.work, engine.tick),
-            *(self._failed, engine.lanes([angles.reshape(count, -1) for angles in swashplates])),
+            *(self._failed, angles),
             *(engine.lanes([plan.air for plan in plans]), ticks, _first(recorded, count), every, loaded),
             *(engine.lanes([plan.azimuth for plan in plans]), air),
             *(states, forces, loads, _first(watched, count), first.watch),
@@ -147,14 +168,15 @@ class Formation:
             working,
         )
         found = []
-        for lane, (one, plan, angles) in enumerate(zip(self.simulations, plans, swashplates, strict=True)):
+        for lane, (one, plan) in enumerate(zip(self.simulations, plans, strict=True)):
+            own = np.ascontiguousarray(angles[..., lane]).reshape(count, -1, S.ROW)
             end, ticks_flown = (int(step[lane]), int(step[lane]) // one.steps_per_tick) if flew[lane] else (-1, -1)
             ticks_flown -= one.step // one.steps_per_tick
             if flew[lane]:
-                one.take_over(end, x[:, lane].copy(), plan.air[ticks], angles[-1].copy())
+                one.take_over(end, x[:, lane].copy(), plan.air[ticks], own[-1].copy())
             if engine.air_rows > CG_ROWS and loaded:
                 plan = replace(plan, wind=air[:, :CG_ROWS, lane].copy())
-            rows = _rows(one, plan, angles, states[..., lane], forces[..., lane], loads[..., lane])
+            rows = _rows(one, plan, own, states[..., lane], forces[..., lane], loads[..., lane])
             rows = replace(rows, acceleration=rows.acceleration + _gravity(one, rows.state)) if loaded else rows
             found.append(
                 Flown(
@@ -163,6 +185,7 @@ class Formation:
                     plan.watched[plan.looks <= end],
                     ticks_flown,
                     self._fault(lane),
+                    plan.air[plan.recorded],
                 )
             )
         return found
@@ -173,6 +196,11 @@ class Formation:
         rows[:, :CG_ROWS] = self._engine.lanes(winds)
         return rows
 
+    @property
+    def engine(self) -> Engine:
+        """What flies the flights."""
+        return self._engine
+
     def retire(self, lane: int) -> None:
         """Fly one of the flights no further."""
         self._failed[lane] = RETIRED
@@ -180,7 +208,7 @@ class Formation:
     def _fault(self, lane: int) -> SimulationError | None:
         """Why a flight has ended."""
         failed = int(self._failed[lane])
-        if failed in (FLYING, RETIRED):
+        if failed < 0:  # it goes on, or it was ended for another reason
             return None
         value = self._engine.tick.last[min(failed, self._engine.size - 1), lane]
         return self.simulations[lane].failure(failed, float(value))

@@ -163,8 +163,9 @@ def certification_gust(
     name : str
         "cs25": CS 25.341(a), U / 2 (1 - cos(pi s / H)) over 2 H, with U = U_ref F_g (H / 107 m)^(1/6). "cs23":
         14 CFR 23.333(c) and 23.341 until amendment 63, U / 2 (1 - cos(2 pi s / 25 C)). "cs27", "cs29": CS 27.341 and
-        CS 29.341, 9.14 m/s, without a shape: here it rises as in MIL-F-8785C over a gradient distance that is given.
-        "mil_f_8785c": MIL-F-8785C, section 3.7, V / 2 (1 - cos(pi x / d)) up to d, and V from then on.
+        CS 29.341, 30 ft/s at each critical airspeed, hover included, without a shape: here it rises as in MIL-F-8785C
+        over a gradient distance that is given. "mil_f_8785c": V / 2 (1 - cos(pi x / d)) up to d, and V from then on, as
+        the MathWorks Aerospace Blockset, Discrete Wind Gust Model, gives the model of MIL-F-8785C.
     to : str
         Where the air goes: "up", "down", "left", "right", "ahead", "back", of an aircraft that heads north; CS 27.341
         has vertical gusts only.

@@ -127,6 +127,29 @@ class Mixer:
         return self._angles is not None and np.array_equal(self._angles, self._target)
 
 
+def limit_texts(aircraft: Aircraft, reached: NDArray[np.int64]) -> list[str]:
+    """Ranges that were exceeded, in words.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    reached : ndarray, shape (2, n_controls + 3 n_rows)
+        Not zero where a control, or what it moves, has been beyond the lower and the upper end of its range.
+    """
+    below, above = reached.tolist()
+    texts, count = [], len(aircraft.controls)
+    for control, *flags in zip(aircraft.controls, below, above, strict=False):
+        for limit, is_reached in zip(control.range, flags, strict=True):
+            if is_reached:
+                texts.append(f"{control.name} at its limit of {control.shown(limit):.6g} {control.shown_unit}")
+    parts = [(row, *part) for row in aircraft.rows for part in zip(row.names, row.ranges, strict=True)]
+    for (row, name, limits), *flags in zip(parts, below[count:], above[count:], strict=True):
+        for limit, is_reached in zip(limits, flags, strict=True):
+            if is_reached:
+                texts.append(f"{row.owner} {name} at its limit of {row.shown(limit)}")
+    return texts
+
+
 def check_controls(aircraft: Aircraft, values: Array) -> None:
     """Raise SimulationError for another number of controls, and for what is not finite or beyond a right angle."""
     if values.shape != (len(aircraft.controls),):

@@ -12,7 +12,10 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.engine import Engine
 from sbs_sim.model import records as R
+from sbs_sim.model.air import air_in_space
+from sbs_sim.model.air_rows import CG_ROWS
 from sbs_sim.model.power import BLADE_POWERS, POWER_TERMS, power_rows
+from sbs_sim.model.wind import winds_at
 
 Array = NDArray[np.float64]
 
@@ -36,7 +39,15 @@ def check_balance(aircraft: Aircraft) -> None:
         )
 
 
-def power_balance(engine: Engine, states: Array, swashplates: Array, azimuths: Array, air: Array) -> Array:
+def power_balance(
+    engine: Engine,
+    states: Array,
+    swashplates: Array,
+    azimuths: Array,
+    air: Array,
+    noise: Array | None = None,
+    times: Array | None = None,
+) -> Array:
     """Power of every term at instants of a flight.
 
     Parameters
@@ -48,21 +59,40 @@ def power_balance(engine: Engine, states: Array, swashplates: Array, azimuths: A
         [rad]
     azimuths : ndarray, shape (n, n_rotors)
         Of the rotors [rad]; of those with a drive where that of the drive is zero.
-    air : ndarray, shape (n, 3)
-        Velocity of the air, NED [m/s].
+    air : ndarray, shape (n, WIND_SIZE), or (n, 3)
+        Air of the ticks that begin there, or velocity of the air where it is the same everywhere, NED [m/s].
+    noise : ndarray, shape (n, n_rotors), optional
+        Of vortex rings whose thrust fluctuates; none without it.
+    times : ndarray, shape (n,), optional
+        [s]; with the air of ticks.
 
     Returns
     -------
     ndarray, shape (n, len(POWER_TERMS))
         [W], in the order of `POWER_TERMS`: "engine" and "actuators" are what is given, all others what is taken.
     """
-    count = len(states)
+    count, local = len(states), engine.is_local
+    velocities = air
+    if times is not None:
+        velocities = np.zeros((count, CG_ROWS, 1))
+        winds_at(_lane(air), np.ascontiguousarray(times), engine.model.air, velocities)
+        velocities = velocities[..., 0]
     sums = R.records(BLADE_POWERS, len(engine.work.sums), engine.n)
     found = engine.memory(count, len(POWER_TERMS))
-    power_rows(
-        *(engine.code.derivative, engine.model, _lane(states), _lane(swashplates.reshape(count, -1))),
-        *(_lane(azimuths), _lane(air), engine.work, sums, engine.tick.slopes[0], found),
-    )
+    given = [_lane(states), _lane(swashplates.reshape(count, -1)), _lane(azimuths)]
+    rings = _lane(np.zeros((count, engine.work.ring.shape[1])) if noise is None else noise)
+    memory = engine.work, sums, engine.tick.slopes[0]
+    if not local or times is None:
+        power_rows(engine.code.derivative, engine.model, *given, _lane(velocities), rings, *memory, found)
+        return np.asarray(found[..., 0])
+    for i in range(count):
+        one = slice(i, i + 1)
+        rows = engine.memory(1, engine.air_rows)
+        rows[0, :CG_ROWS, 0] = velocities[i]
+        where = engine.model, given[0][i], given[2][i]
+        air_in_space(*where, _lane(air[i]), float(times[i]), engine.tick.space, rows[0])
+        own = (*(part[one] for part in given), rows, rings[one])
+        power_rows(engine.code.derivative, engine.model, *own, *memory, found[one])
     return np.asarray(found[..., 0])
 
 

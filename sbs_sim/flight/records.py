@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -57,8 +57,18 @@ class Instants(ByContent, Generic[Step, Time]):
     contact: Array | None = None
 
 
+@dataclass(frozen=True, eq=False)
 class Snapshot(Instants[int, float]):
-    """One instant of a flight."""
+    """One instant of a flight.
+
+    Attributes
+    ----------
+    derivative : ndarray, shape (size,)
+        Of the state with respect to time. That of a stitched model is of the states that the model keeps, of which
+        those of the body come first; it is empty where it is not known.
+    """
+
+    derivative: Array = field(default_factory=lambda: np.empty(0))
 
 
 class Rows(Instants[NDArray[np.int64], Array]):

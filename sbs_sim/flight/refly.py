@@ -4,12 +4,16 @@ from __future__ import annotations  # `help` then shows types by their names
 
 import collections
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.records import Event, Snapshot
 from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.stitched_simulation import begun
+
+STITCHED_OPTIONS = ("tick", "ground_altitude")  # the others are those of the model
 
 
 def started(aircraft: Aircraft, events: Sequence[Event], **options: Any) -> Simulation:
@@ -21,7 +25,7 @@ def started(aircraft: Aircraft, events: Sequence[Event], **options: Any) -> Simu
     events : sequence of Event
         The first is the start.
     **options :
-        Those of `Simulation` but for the wind.
+        Those of `Simulation` but for the wind; "model" is a stitched one that flew, or None.
 
     Raises
     ------
@@ -31,9 +35,19 @@ def started(aircraft: Aircraft, events: Sequence[Event], **options: Any) -> Simu
     start = events[0] if events else None
     if start is None or start.kind != "start" or start.state is None or start.swashplate is None:
         raise SimulationError("events: the first must be the start of the flight")
-    simulation = Simulation(aircraft, start.state, start.swashplate, wind=start.wind, **options)
+    model = options.pop("model", None)
+    if model is not None:
+        options = {name: options[name] for name in STITCHED_OPTIONS if name in options}
+    simulation = begun(aircraft, model, start.state, start.swashplate, wind=start.wind, **options)
     simulation.resume_from(start)
     return simulation
+
+
+def rescaled(events: Sequence[Event], factor: float) -> tuple[Event, ...]:
+    """Events of a flight whose steps are shorter by a factor: what acted acts at the same time."""
+    return tuple(
+        replace(event, step=round(event.step * factor), wind_step=round(event.wind_step * factor)) for event in events
+    )
 
 
 def refly(aircraft: Aircraft, events: Sequence[Event], last_step: int, **options: Any) -> Iterator[Snapshot]:

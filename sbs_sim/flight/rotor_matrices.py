@@ -45,8 +45,8 @@ class RotorMatrices(NamedTuple):
 def rotor_matrices(aircraft: "Aircraft", lead_lag: bool, cyclic_inflow: bool, step: float) -> RotorMatrices:
     """Coefficients of a step [s]; worked out once for an aircraft, read only.
 
-    The rates of a rotor's flap, lag and inflow are linearized where it carries its share of the weight in level rest.
-    There the multiblade coordinates of one harmonic depend on one another alone, and not on the azimuth.
+    The rates of a rotor's flap, lag, inflow and wake are linearized where it carries its share of the weight in level
+    rest. There the multiblade coordinates of one harmonic depend on one another alone, and not on the azimuth.
     """
     key = RotorMatrices, lead_lag, cyclic_inflow, step
     if key not in aircraft.kept:
@@ -65,11 +65,12 @@ def arranged(parts: Sequence[RotorMatrices | None]) -> Exponential | None:
 
 
 def _blocks(aircraft: "Aircraft") -> list[list[int]]:
-    """States that belong together: of each harmonic of a rotor with its inflow, and the differential ones."""
+    """States that belong together: of each harmonic of a rotor with its inflow and wake, and the differential ones."""
     layout, found = aircraft.layout, []
     for j, rotor in enumerate(aircraft.rotors):
         parts = [layout.flap(j).start, layout.flap_rate(j).start, layout.lag(j).start, layout.lag_rate(j).start]
         inflow = layout.inflow(j).start
+        parts += list(layout.wake_pairs(j)[0]) if layout.wake_pairs(j) else []
         found.append([*parts, inflow])
         for n in range(1, S.harmonic_count(rotor.blades) + 1):
             block = [part + i for part in parts for i in (2 * n - 1, 2 * n)]
@@ -94,7 +95,8 @@ def _rates_by_states(aircraft: "Aircraft", lead_lag: bool, cyclic_inflow: bool) 
             steps[part.start - offset : part.stop - offset] = ANGLE_STEP
         for part in (layout.flap_rate(j), layout.lag_rate(j)):
             steps[part.start - offset : part.stop - offset] = ANGLE_STEP * rotor.speed
-        steps[layout.inflow(j).start - offset : layout.inflow(j).stop - offset] = INFLOW_STEP
+        for part in (layout.inflow(j), layout.wake(j)):
+            steps[part.start - offset : part.stop - offset] = INFLOW_STEP
     # controls are the angles of the swashplates, without a constant, and there are no other commands
     swashplates = np.eye(S.ROW * len(aircraft.rows), len(point) - size + 1)
     swashplates[len(point) - size :] = 0.0

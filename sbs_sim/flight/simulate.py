@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from numpy.typing import ArrayLike
 
 from sbs_sim.aircraft import Aircraft
+from sbs_sim.flight.controller import Controller
 from sbs_sim.flight.controls import Commands
 from sbs_sim.flight.engine_failure import EngineFailure
 from sbs_sim.flight.history import History
@@ -20,7 +21,7 @@ from sbs_sim.model.wind import Wind
 def simulate(
     aircraft: Aircraft,
     start: TrimPoint | ArrayLike,
-    controls: Commands,
+    controls: Commands | Controller,
     duration: float,
     *,
     tick: float = 0.01,
@@ -41,10 +42,11 @@ def simulate(
     aircraft : Aircraft
     start : TrimPoint or ndarray, shape (size,)
         A trim point, flown from the origin heading north, or a simulation state.
-    controls : array_like or callable
+    controls : array_like, callable or Controller
         Pilot controls [rad, or their units] in the order of `Aircraft.control_names`: shape (n_controls,) for the whole
         flight, shape (n, n_controls) one row per tick (the last is held), or a function of time [s] that gives
-        (n_controls,).
+        (n_controls,). A `Controller` puts a control law into the loop: it sees the flight. "controls" of the result are
+        then those that act, behind its delay and its lag.
     duration : float
         [s], rounded to whole ticks.
     tick, azimuth_step, lead_lag, cyclic_inflow, method, wind, ground_altitude
@@ -53,7 +55,7 @@ def simulate(
         False: controls must be within their ranges, and the swashplates follow them at once, as linear models have it;
         steps that their actuators would not follow are in `warnings`. True: the mixer of the live flight is
         between them. It clips controls and angles to their ranges, with a warning, and moves the swashplates at the
-        rates of their actuators.
+        rates of their actuators. A `Controller` always flies through the mixer.
     events : sequence of EngineFailure
         Of aircraft with drives: engines that fail, or run again, on the way.
     outputs : sequence of str

@@ -9,7 +9,7 @@ from __future__ import annotations  # `help` then shows types by their names
 
 import math
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +19,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.commands import row_problems
 from sbs_sim.aircraft.model_records import ground_record
 from sbs_sim.errors import SimulationError
-from sbs_sim.flight.contact import check_step, ground_forces
+from sbs_sim.flight.contact import amplification, check_step, ground_forces
 from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.formation import Flown, Formation
 from sbs_sim.flight.records import Event, Snapshot
@@ -29,10 +29,14 @@ from sbs_sim.model.air import air_in_space
 from sbs_sim.model.frames import down_of
 from sbs_sim.model.ground import lowest_point
 from sbs_sim.model.integrate import ETD, FLYING, PARTITIONED, RK4, TSIT5, advance, azimuths_at
-from sbs_sim.model.records import Space
+from sbs_sim.model.records import NOISE, Space
+from sbs_sim.model.ring_noise import RingNoise
 from sbs_sim.model.solve import length
 from sbs_sim.model.wind import Wind, WindField, winds_at
 from sbs_sim.model.working_state import WORKING_SIZE, working_state
+
+if TYPE_CHECKING:
+    from sbs_sim.flight.stitched import StitchedModel
 
 Array = NDArray[np.float64]
 
@@ -57,6 +61,7 @@ PLAUSIBLE_POSITION = 1e8  # m
 PLAUSIBLE_VELOCITY = 350.0  # m/s
 PLAUSIBLE_RATE = 100.0  # rad/s
 PLAUSIBLE_ANGLE = 1.5  # rad, multiblade coordinates of flap and lag
+PLAUSIBLE_SHARE = 2.0  # of the chord that is attached, or flow across the chord over the tip speed
 PLAUSIBLE_INFLOW = 1.0
 PLAUSIBLE_SPEED = 3.0  # of rotors, over that of the file
 PLAUSIBLE_TURNS = 1e9  # rad
@@ -94,6 +99,8 @@ class Simulation:
     SimulationError
         A value out of range or a state that is not plausible, naming it.
     """
+
+    stitched: StitchedModel | None = None  # that flies in place of the full model
 
     def __init__(
         self,
@@ -141,15 +148,28 @@ class Simulation:
         self.model = aircraft.model(lead_lag, cyclic_inflow)._replace(ground=self.ground)
         if aircraft.has_contact:
             check_step(aircraft, self.method, self.step_size)
+        self._check_wakes(method)
         depth = float(self.ground["depth"][0, 0])
         self.bounds = np.append(plausible_bounds(aircraft), math.inf if math.isinf(ground) else depth)
         self.watch = max(1, round(WATCH_PERIOD / tick))
         self.azimuth0 = np.zeros(len(aircraft.rotors))
         self._held = held_states(aircraft, lead_lag, cyclic_inflow)
         self.step = 0
+        self._ring: RingNoise | None = None
         self.set_wind(Wind() if wind is None else wind)
         self.state = self.checked_state(state)
         self.swashplate = self.checked_swashplate(swashplate)
+
+    def _check_wakes(self, method: str) -> None:
+        """Raise SimulationError where the circulation of blades follows faster than a step can hold."""
+        for rotor in self.aircraft.rotors:
+            change = rotor.wake_rate * self.step_size
+            if method in FREE_METHODS and abs(amplification(self.method, complex(-change))) > 1.0:
+                raise SimulationError(
+                    f"{rotor.name}: unsteady_airfoil = {rotor.unsteady_airfoil}, whose circulation follows at"
+                    f" {rotor.wake_rate:.4g} 1/s, is not stable at a step of {1e3 * self.step_size:.4g} ms with method"
+                    f" = {method}: allowed are a smaller azimuth_step, or a longer chord"
+                )
 
     @cached_property
     def engine(self) -> Engine:
@@ -199,7 +219,9 @@ class Simulation:
         checks.integer("wind_ticks", start.wind_ticks, 0, MAX_WIND_TICKS, SimulationError)
         self.step, self._wind_step = start.step, start.wind_step
         self._set_field(WindField(self.wind, start.wind_step * self.step_size, self.tick, self._level))
-        self._air = self._field.tick_number(max(1, start.wind_ticks))
+        if self._ring is not None:
+            checks.integer("step", start.step, 0, MAX_WIND_TICKS * self.steps_per_tick, SimulationError)
+        self._air = self._with_rings(self._field.tick_number(max(1, start.wind_ticks))[np.newaxis], self.step)[0]
 
     def act(self, event: Event) -> None:
         """Let an event act; one with a state resets.
@@ -281,11 +303,14 @@ class Simulation:
         checks.instance("wind", wind, Wind, SimulationError)
         self._wind_step = self.step
         self._set_field(WindField(wind, self.time, self.tick, self._level))
-        self._air = self._field.next_tick()
+        self._air = self._with_rings(self._field.next_tick()[np.newaxis], self.step)[0]
 
     def _set_field(self, field: WindField) -> None:
-        """Fly through the air of a wind from now on."""
+        """Fly through the air of a wind from now on, with the noise of its seed."""
         self._field = field
+        if self.model.switches["ring"][0] and (self._ring is None or self._ring.seed != self.wind.turbulence_seed):
+            speeds = [rotor.speed for rotor in self.aircraft.rotors]
+            self._ring = RingNoise(speeds, self.wind.turbulence_seed, self.tick)
         if "engine" in self.__dict__:  # it has been made
             self.engine.set_space([self.space])
 
@@ -350,7 +375,7 @@ class Simulation:
         self.step += int(engine.tick.done[0])
         if failed[0] != FLYING:
             raise self.failure(int(failed[0]), float(engine.tick.last[min(failed[0], engine.size - 1), 0]))
-        self._air = self._field.next_tick()
+        self._air = self._with_rings(self._field.next_tick()[np.newaxis], self.step)[0]
 
     def failure(self, failed: int, value: float) -> SimulationError:
         """Why the flight cannot go on: a state that the next step would take to a value beyond the plausible."""
@@ -378,8 +403,27 @@ class Simulation:
         self.step, self.state, self._air, self.swashplate = step, state, air, swashplate
 
     def air_ahead(self, ticks: int) -> Array:
-        """Air of this tick and of so many that follow, shape (ticks + 1, WIND_SIZE)."""
-        return np.concatenate([self._air[np.newaxis], self._field.next_ticks(ticks)])
+        """Air of this tick and of so many that follow, shape (ticks + 1, WIND_SIZE).
+
+        Where the thrust of rotors fluctuates, the noise of every rotor at the beginning of the tick and at its end is
+        behind it, shape (ticks + 1, WIND_SIZE + 2 n_rotors).
+        """
+        following = self._with_rings(self._field.next_ticks(ticks), self.step + self.steps_per_tick)
+        return np.concatenate([self._air[np.newaxis], following])
+
+    def _with_rings(self, air: Array, step: int) -> Array:
+        """Air of ticks from that of a step on with the noise of vortex rings behind it."""
+        if self._ring is None:
+            return air
+        ends = self._ring.ends(step // self.steps_per_tick, len(air))
+        return np.concatenate([air, ends[:-1], ends[1:]], axis=1)
+
+    def ring_noise(self, steps: NDArray[np.int64]) -> Array | None:
+        """Noise of vortex rings at the beginnings of ticks, shape (n, n_rotors); None where no thrust fluctuates."""
+        if self._ring is None or not len(steps):
+            return None
+        ticks = steps // self.steps_per_tick
+        return self._ring.ends(int(ticks[0]), int(ticks[-1] - ticks[0]))[ticks - ticks[0]]
 
     def air_at(self, steps: NDArray[np.int64], air: Array) -> Array:
         """Velocity of the air at the beginnings of ticks, NED [m/s], shape (n, 3), but for what depends on a place."""
@@ -402,8 +446,13 @@ class Simulation:
         air[:3, 0] = self.air_at(now, self._air[np.newaxis])[0]
         if self.space is not None:
             wind = _single(self._air)
-            air_in_space(engine.model, _single(self.state), wind, self.time, engine.tick.space, air)
+            air_in_space(
+                *(engine.model, _single(self.state), _single(azimuth), wind, self.time, engine.tick.space, air)
+            )
         working = engine.memory(engine.rotors, WORKING_SIZE)
+        noise = self.ring_noise(now)
+        if noise is not None:
+            engine.work.ring[NOISE] = noise.T
         engine.derivative(
             *(engine.model, _single(self.state), _single(self.swashplate), _single(azimuth), air),
             *(engine.work, engine.tick.slopes[0], True),
@@ -422,6 +471,7 @@ class Simulation:
             wind=air[:3, 0].copy(),
             working=working[..., 0],
             contact=None if contact is None else contact[0],
+            derivative=engine.tick.slopes[0, : self.layout.size, 0].copy(),
         )
 
 
@@ -475,6 +525,8 @@ def plausible_bounds(aircraft: Aircraft) -> Array:
     for j, rotor in enumerate(aircraft.rotors):
         bounds[layout.flap(j)] = bounds[layout.lag(j)] = PLAUSIBLE_ANGLE
         bounds[layout.flap_rate(j)] = bounds[layout.lag_rate(j)] = PLAUSIBLE_ANGLE * 10 * rotor.speed
+        bounds[layout.wake(j)] = PLAUSIBLE_SHARE
+    bounds[layout.separations_start :] = PLAUSIBLE_SHARE
     for i in range(len(layout.drives)):
         speed, places = aircraft.drive_speed(i), layout.drive(i)
         bounds[list(places.values())] = 1e9

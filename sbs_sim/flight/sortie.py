@@ -14,16 +14,20 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.concurrency import interruption
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.actuation import Direct, Mixed, commanded_angles
+from sbs_sim.flight.closed_loop import ClosedLoop, OwnLoop
+from sbs_sim.flight.controller import Controller
 from sbs_sim.flight.controls import Commands, check_rows, command
 from sbs_sim.flight.engine_failure import EngineFailure, failures_by_tick
 from sbs_sim.flight.formation import Flown, Formation
 from sbs_sim.flight.history import History, named_histories
-from sbs_sim.flight.power_balance import POWER_BALANCE, check_balance, named_balance, power_balance
+from sbs_sim.flight.power_balance import check_balance, named_balance, power_balance
 from sbs_sim.flight.records import Rows
 from sbs_sim.flight.simulation import Simulation, ground_level, ground_of
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.flight.validity import flight_warnings
+from sbs_sim.model import state as S
+from sbs_sim.model.air import ELEMENTS
 from sbs_sim.model.records import CONTACT, FUSELAGE, INTEGER, SCHEDULE, SURFACE, Model
 from sbs_sim.model.wind import Wind
 
@@ -68,7 +72,7 @@ class Sortie:
         self,
         aircraft: Aircraft,
         start: TrimPoint | ArrayLike,
-        controls: Commands,
+        controls: Commands | Controller,
         duration: float,
         *,
         every: int = 1,
@@ -86,25 +90,32 @@ class Sortie:
         actuators = checks.flag("actuators", actuators, SimulationError)
         air = Wind() if wind is None else wind
         checks.instance("wind", air, Wind, SimulationError)
-        if balanced and air.is_local:
-            raise SimulationError(f"outputs: {POWER_BALANCE!r}: allowed is air that is the same everywhere")
         state: ArrayLike
         if isinstance(start, TrimPoint):
             ground = ground_of(aircraft, options.get("ground_altitude"))
             state = trimmed_state(aircraft, start, wind=air.velocity_at(-ground_level(ground)))
         else:
             state = start
+        self.loop: OwnLoop | None = None
         initial = start.swashplate if isinstance(start, TrimPoint) else None
-        pilot_command = command(aircraft, controls)
-        self._pilot = (Mixed if actuators else Direct)(aircraft, pilot_command, initial)
-        angles = self._pilot.angles(pilot_command(0, 0.0), 0.0)
-        self.simulation = Simulation(aircraft, state, angles, wind=air, **options)
+        if isinstance(controls, Controller):
+            trimmed = (start.controls, start.swashplate) if isinstance(start, TrimPoint) else None
+            self.loop = OwnLoop(aircraft, controls, trimmed)
+            self.simulation = Simulation(aircraft, state, self.loop.position, wind=air, **options)
+            self.loop.structure(self.simulation.tick)  # checks times
+        else:
+            pilot_command = command(aircraft, controls)
+            self._pilot = (Mixed if actuators else Direct)(aircraft, pilot_command, initial)
+            angles = self._pilot.angles(pilot_command(0, 0.0), 0.0)
+            self.simulation = Simulation(aircraft, state, angles, wind=air, **options)
         self.ticks = round(duration / self.simulation.tick)
-        check_rows(controls, self.ticks, self.simulation.tick)
+        if not isinstance(controls, Controller):
+            check_rows(controls, self.ticks, self.simulation.tick)
         self.failures = failures_by_tick(self.simulation, events)
         self.every, self.loaded, self.balanced = every, loaded, balanced
         self.fault: SimulationError | None = None
         self._blocks: list[tuple[Rows, Array]] = []
+        self._air: list[Array] = []
         self._looks: list[Array] = []
         self._given, self._begin = np.empty(0), 0
         self._wrong: SimulationError | None = None
@@ -115,11 +126,27 @@ class Sortie:
         self._begin = begin
         return angles
 
+    def accept(self, given: Array, wrong: SimulationError | None, begin: int) -> None:
+        """Take over the controls of a law in ticks from `begin` on, (n, n_controls), and what was wrong after them."""
+        self._given, self._wrong, self._begin = given, wrong, begin
+
+    @property
+    def has_controls(self) -> bool:
+        """True if the first of the ticks that are flown has right controls."""
+        return len(self._given) > 0
+
+    @property
+    def structure(self) -> Any:
+        """What flights that are flown side by side have in common."""
+        own = None if self.loop is None else self.loop.structure(self.simulation.tick)
+        return structure(self.simulation), own
+
     def take(self, flown: Flown) -> None:
         """Take over what the ticks that were commanded have given."""
         ticks = flown.rows.step // self.simulation.steps_per_tick - self._begin
         count = int(np.count_nonzero(ticks < len(self._given)))
         self._blocks.append((flown.rows.first(count), self._given[ticks[:count]]))
+        self._air.append(flown.air[:count])
         self._looks.append(flown.working[flown.watched < len(self._given)])
         self.fault = flown.fault if flown.ticks < len(self._given) else None
         self.fault = self.fault or self._wrong
@@ -140,7 +167,8 @@ class Sortie:
             raise self.fault
         aircraft = self.simulation.aircraft
         working = np.concatenate(self._looks)
-        lines = (*flight_warnings(aircraft, working), *self._pilot.warnings(self.simulation.tick))
+        told = self._pilot.warnings(self.simulation.tick) if self.loop is None else self.loop.warnings()
+        lines = (*flight_warnings(aircraft, working), *told)
         named = named_histories(aircraft, self._blocks, self.loaded)
         if self.balanced:
             named |= self._balance(named["state"], named["swashplate"])
@@ -148,9 +176,10 @@ class Sortie:
 
     def _balance(self, states: Array, swashplates: Array) -> dict[str, Array]:
         """Histories of the balance of power by name."""
-        steps, air = (np.concatenate([getattr(rows, name) for rows, _ in self._blocks]) for name in ("step", "wind"))
-        instants = states, swashplates, self.simulation.azimuths(steps), air
-        return named_balance(power_balance(self.simulation.engine, *instants))
+        steps, times = (np.concatenate([getattr(rows, name) for rows, _ in self._blocks]) for name in ("step", "time"))
+        instants = states, swashplates, self.simulation.azimuths(steps), np.concatenate(self._air)
+        noise = self.simulation.ring_noise(steps)
+        return named_balance(power_balance(self.simulation.engine, *instants, noise, times))
 
 
 def fly_together(sorties: Sequence[Sortie]) -> None:
@@ -162,6 +191,8 @@ def fly_together(sorties: Sequence[Sortie]) -> None:
         One, or up to `sbs_sim.model.packing.lane_count()` with `structure` and ticks in common.
     """
     formation, first = Formation([sortie.simulation for sortie in sorties]), sorties[0]
+    loops = [sortie.loop for sortie in sorties if sortie.loop is not None]
+    loop = ClosedLoop(loops, formation.engine, first.simulation.tick) if loops else None
     size, last = _block(first.simulation, len(sorties)), first.ticks + 1
     cuts = {*range(0, last, size), *(tick for sortie in sorties for tick in sortie.failures if tick < last)}
     for begin, end in itertools.pairwise([*sorted(cuts), last]):
@@ -170,22 +201,45 @@ def fly_together(sorties: Sequence[Sortie]) -> None:
             for failure in sortie.failures.get(begin, ()):
                 sortie.simulation.fail_engine(failure.drive, failure.share)
         flying = [sortie.fault is None for sortie in sorties]
-        angles = [
-            sortie.commanded(begin, end) if one else np.empty(0) for sortie, one in zip(sorties, flying, strict=True)
-        ]
-        most = max(map(len, angles))
-        if most:
-            padded = [_padded(own, most, sortie.simulation) for own, sortie in zip(angles, sorties, strict=True)]
-            flown = formation.fly(padded, min(most, first.ticks - begin), first.every, first.loaded)
-        for lane, (sortie, own) in enumerate(zip(sorties, angles, strict=True)):
-            if flying[lane] and len(own):
-                sortie.take(flown[lane])
+        if loop is None:
+            flown = _commanded(sorties, formation, begin, end)
+        else:
+            flown = _controlled(sorties, formation, loop, begin, end)
+        for lane, (sortie, own) in enumerate(zip(sorties, flown, strict=True)):
+            if flying[lane] and own is not None:
+                sortie.take(own)
             elif flying[lane]:
                 sortie.end()
             if sortie.fault is not None:
                 formation.retire(lane)
         if all(sortie.fault is not None for sortie in sorties):
             return
+
+
+def _commanded(sorties: Sequence[Sortie], formation: Formation, begin: int, end: int) -> list[Flown | None]:
+    """What ticks under commands give; None of a flight without a right command."""
+    angles = [sortie.commanded(begin, end) if sortie.fault is None else np.empty(0) for sortie in sorties]
+    most, first = max(map(len, angles)), sorties[0]
+    if not most:
+        return [None] * len(sorties)
+    padded = [_padded(own, most, sortie.simulation) for own, sortie in zip(angles, sorties, strict=True)]
+    flown = formation.fly(padded, min(most, first.ticks - begin), first.every, first.loaded)
+    return [part if len(own) else None for part, own in zip(flown, angles, strict=True)]
+
+
+def _controlled(
+    sorties: Sequence[Sortie], formation: Formation, loop: ClosedLoop, begin: int, end: int
+) -> list[Flown | None]:
+    """What ticks under control laws give; None of a flight whose first controls are wrong."""
+    first = sorties[0]
+    memory = formation.engine.memory(end - begin, S.ROW * len(first.simulation.aircraft.rows))
+    flown = formation.fly_by(loop.way, memory, min(end, first.ticks) - begin, first.every, first.loaded)
+    found: list[Flown | None] = []
+    for lane, (sortie, own) in enumerate(zip(sorties, flown, strict=True)):
+        if sortie.fault is None:
+            sortie.accept(*loop.given(lane, begin), begin)
+        found.append(own if sortie.has_controls else None)
+    return found
 
 
 def _padded(angles: Array, count: int, simulation: Simulation) -> Array:
@@ -199,13 +253,18 @@ def structure(simulation: Simulation) -> Any:
     aircraft, model = simulation.aircraft, simulation.model
     blades = tuple(rotor.blades for rotor in aircraft.rotors)
     sections = tuple(tuple(map(id, tables)) for tables in aircraft.sections)
-    of_rotors = (model.rotors[name] for name in ("drive", "duct", "teetering"))
+    of_rotors = (model.rotors[name] for name in ("drive", "duct", "teetering", "measured_descent"))
     drives = *of_rotors, *(model.drives[name] for name in ("engine", "free_wheel", "command_index"))
     return (
         *(blades, aircraft.options, sections, simulation.steps_per_tick, simulation.method),
-        *(simulation.tick, simulation.step, simulation.space is None, model.switches.tobytes()),
+        *(simulation.tick, simulation.step, _air_kind(simulation), model.switches.tobytes()),
         *(aircraft.layout.drives, *(part.tobytes() for part in drives), *_integers(model)),
     )
+
+
+def _air_kind(simulation: Simulation) -> int:
+    """0 for air that is the same everywhere, 1 where it is not, 2 where blade elements meet it."""
+    return 0 if simulation.space is None else 1 + int(simulation.space.parameters[ELEMENTS, 0])
 
 
 def _integers(model: Model) -> Iterator[bytes]:

@@ -11,6 +11,7 @@ from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.model_records import drive_of
 from sbs_sim.errors import SimulationError
+from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.trim_point import StandPoint, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_to_quaternion, quaternion_to_euler, rotation_matrix
@@ -64,13 +65,34 @@ def trimmed_state(
         )
     heading = checks.number("heading", heading, -4 * math.pi, 4 * math.pi, "rad", SimulationError)
     if isinstance(point, StandPoint):
-        return _displaced(slowed(aircraft, point.simulation_state(aircraft.layout), rotor_speed), position, heading)
+        state = slowed(aircraft, point.simulation_state(aircraft.layout), rotor_speed)
+        return with_steady_separation(aircraft, _displaced(state, position, heading), point.swashplate, wind)
     state = aircraft.layout.from_linear(point.state, heading)
     state[: S.ATTITUDE] = position
     north, east, down = np.asarray(wind, dtype=float).tolist()
     to_earth = rotation_matrix(euler_to_quaternion(heading, point.pitch, point.roll))
     state[S.VELOCITY : S.RATES] += to_earth[0] * north + to_earth[1] * east + to_earth[2] * down
-    return slowed(aircraft, state, rotor_speed)
+    return with_steady_separation(aircraft, slowed(aircraft, state, rotor_speed), point.swashplate, wind)
+
+
+def with_steady_separation(aircraft: Aircraft, state: Array, swashplate: Array, wind: ArrayLike) -> Array:
+    """Simulation state whose sections have the separation that stays in the flow at the azimuth 0.
+
+    The rates are straight lines over the shares: two of them say where they vanish. Sections without flow are attached.
+    """
+    if not aircraft.has_separation:
+        return state
+    engine, first = Engine(aircraft.arranged(True, True, "blades")), aircraft.layout.separations_start
+    found = state.copy()
+    given = [engine.lanes([np.ravel(swashplate)]), engine.memory(len(aircraft.rotors))]
+    air, out, rates = engine.lanes([np.asarray(wind, dtype=float)]), engine.memory(len(state)), []
+    for share in (0.0, 1.0):
+        found[first:] = share
+        engine.derivative(engine.model, engine.lanes([found]), *given, air, engine.work, out, False)
+        rates.append(out[first:, 0].copy())
+    slope = rates[0] - rates[1]
+    found[first:] = np.where(slope > 0.0, rates[0] / np.where(slope > 0.0, slope, 1.0), 1.0)
+    return found
 
 
 def _displaced(state: Array, position: ArrayLike, heading: float) -> Array:
@@ -99,6 +121,7 @@ def standing_state(
     state = np.zeros(aircraft.layout.size)
     state[: S.ATTITUDE] = position
     state[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(heading, 0.0, 0.0)
+    state[aircraft.layout.separations_start :] = 1.0
     for i in range(len(aircraft.drives)):
         state[aircraft.layout.drive(i)[S.SPEED]] = aircraft.drive_speed(i)
     return slowed(aircraft, state, rotor_speed)
@@ -130,6 +153,7 @@ def slowed(aircraft: Aircraft, state: Array, rotor_speed: float) -> Array:
         if drive_of(aircraft, rotor) >= 0:
             for part in (layout.flap(j), layout.flap_rate(j), layout.lag(j), layout.lag_rate(j), layout.inflow(j)):
                 changed[part] *= share
+            changed[layout.wake(j)] *= share
     for i, drive in enumerate(aircraft.drives):
         changed[[layout.drive(i)[name] for name in drive.state_names]] *= share
     return changed

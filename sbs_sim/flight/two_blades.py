@@ -139,6 +139,7 @@ def _without_two_blades(
     made[new.drives_start + shift :] = state[old.drives_start + shift :]
     for j, rotor in enumerate(aircraft.rotors):
         made[_moved(new.inflow(j), shift)] = state[_moved(old.inflow(j), shift)]
+        made[_moved(new.wake(j), shift)] = state[_moved(old.wake(j), shift)]
         for angle, rate in (("flap", "flap_rate"), ("lag", "lag_rate")):
             pairs = [(getattr(old, name)(j), getattr(new, name)(j)) for name in (angle, rate)]
             if rotor.blades == 2:

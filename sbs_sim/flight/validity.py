@@ -12,12 +12,19 @@ from sbs_sim.aircraft.description import Rotor
 from sbs_sim.model import working_state as W
 from sbs_sim.model.airfoil import NUMBER_NAMES
 from sbs_sim.model.ground_effect import CURVE, LEAST_HEIGHT
+from sbs_sim.model.interference import TURNING
+from sbs_sim.model.ring import RING_BEGIN, RING_EDGEWISE, WINDMILL_BEGIN
+from sbs_sim.model.unsteady_airfoil import STATION
 
 Array = NDArray[np.float64]
 
 # Beyond this the inflow over the disc is no longer linear along and across it, and the retreating blade is stalled.
 MAX_ADVANCE_RATIO = 0.4
-MAX_STALLED = 0.1  # of the disc; the sections know nothing of dynamic stall
+STALL = "stall on more than"  # words of the warning
+MAX_STALLED = 0.1  # of the disc; the sections know nothing of dynamic stall, or at most of late separation
+# Reduced frequency of one per revolution at three quarters of the radius: the lift of pitch rate and apparent mass,
+# which is ahead of the flow, is 1.5 of it in the lift of a cyclic pitch (theory.md section 4.9).
+MAX_REDUCED_FREQUENCY = 0.1
 MAX_REVERSED = 0.1  # of the disc; reached at an advance ratio of 0.63, where the circle of reverse flow has mu^2 / 4
 # Of airfoil tables over the Reynolds number, which have no Mach number. By the rule of Prandtl and Glauert (J. D.
 # Anderson: Fundamentals of aerodynamics, section 11.4) a section lifts 1 / sqrt(1 - M^2) of what it does in
@@ -35,11 +42,12 @@ OFFSET_POINTS = 101  # along the blade
 # helicopter in it becomes unstable, W. Johnson: Model for vortex ring state influence on rotorcraft flight dynamics,
 # NASA/TP-2005-213477; up to twice the hover inflow there is no stream tube, J. G. Leishman: Principles of helicopter
 # aerodynamics, 2nd ed., section 2.13. For open rotors; a duct moves these limits.
-RING_DESCENT = (0.45, 1.5)
-RING_EDGEWISE = 0.95
-WINDMILL_DESCENT = 2.0
+RING_DESCENT = (RING_BEGIN, 1.5)
 # Heights of a hub above the ground, over the radius, below which the ground effect of a choice is not known.
 LEAST_HEIGHTS = {"cheeseman_bennett": LEAST_HEIGHT, "measured": 2.0 * float(CURVE[0, 0])}
+# A hub behind that of a rotor with a swept wake, over the radius of that: beyond three quarters of its diameter from
+# the front the wake rolls up, and a cylinder gives less and less of the flow; H. H. Heyson, NACA TN 3691, 1956.
+MAX_BEHIND = 0.5
 MIN_SPEED = 0.2  # of a rotor's own below which it hardly turns: centrifugal force is 4 % of what it is then
 MARGIN = 1e-9  # for rounding
 MIN_INFLOW = 0.002  # hover inflow ratio below which a rotor carries nothing, and has none of these states
@@ -139,7 +147,7 @@ def inflow_state(descent: float, edgewise: float, with_thrust: bool) -> str:
     if descent < middle:
         return NORMAL
     # Air that still goes through with the thrust solves the equations up to any descent, but air does not do that.
-    return TURBULENT_WAKE if with_thrust or descent < WINDMILL_DESCENT else WINDMILL
+    return TURBULENT_WAKE if with_thrust or descent < WINDMILL_BEGIN else WINDMILL
 
 
 def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> list[str]:
@@ -156,16 +164,23 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
         found += blade_warnings(rotor)
         state = working_state(row)
         if rotor.descent == "measured":
-            if state.inflow_state == VORTEX_RING:
+            if state.inflow_state == VORTEX_RING and rotor.ring_unsteadiness == 0.0:
                 found.append(f"{rotor.name}: {VORTEX_RING} state, whose unsteadiness is missing")
         elif state.inflow_state in (VORTEX_RING, TURBULENT_WAKE):
             found.append(f"{rotor.name}: {state.inflow_state} state, where momentum theory does not hold")
         if state.advance_ratio > MAX_ADVANCE_RATIO:
             found.append(f"{rotor.name}: advance ratio above {MAX_ADVANCE_RATIO:g}")
         if state.stalled_share > MAX_STALLED:
-            found.append(f"{rotor.name}: stall on more than {MAX_STALLED:.0%} of the disc, without its dynamics")
+            dynamics = "the vortex of its dynamics" if rotor.has_late_separation else "its dynamics"
+            found.append(f"{rotor.name}: {STALL} {MAX_STALLED:.0%} of the disc, without {dynamics}")
         if (least := LEAST_HEIGHTS.get(aircraft.ground.effect)) and float(row[W.HEIGHT]) < least:
             found.append(f"{rotor.name}: below {least:g} radii above the ground, where the ground effect is not known")
+        if float(row[W.BEHIND]) > MAX_BEHIND:
+            found.append(f"{rotor.name}: in the wake of a rotor ahead where that rolls up, without its roll-up")
+        if aircraft.options.meets_wakes and _has_no_wake(row):
+            found.append(
+                f"{rotor.name}: hardly any flow through the disc, whose wake for other rotors has no direction"
+            )
         if state.reversed_share > MAX_REVERSED:
             found.append(f"{rotor.name}: reverse flow on more than {MAX_REVERSED:.0%} of the disc")
         if aircraft.number_axis(j) != "mach" and tip_mach(aircraft, rotor, row) > MAX_TIP_MACH:
@@ -176,18 +191,33 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
     return found
 
 
+def _has_no_wake(row: Array | Sequence[float]) -> bool:
+    """True for a loaded rotor through whose disc, and along it, hardly any air flows."""
+    hover = float(row[W.HOVER_INFLOW])
+    flow, along = abs(float(row[W.FLOW])), float(row[W.ADVANCE_RATIO])
+    return hover >= MIN_INFLOW and max(flow, along) < TURNING * hover
+
+
 def blade_warnings(rotor: Rotor) -> list[str]:
-    """Offsets of blades with which they would not stay as rigid as they are here (theory.md section 3.6)."""
+    """Offsets of blades that would bend them (theory.md section 3.6), chords too long for their unsteady airfoils."""
+    found = []
+    if rotor.has_wake_states and _reduced_frequency(rotor) > MAX_REDUCED_FREQUENCY:
+        found.append(f"{rotor.name}: reduced frequency above {MAX_REDUCED_FREQUENCY:g}, without apparent mass")
     if not rotor.has_offsets:
-        return []
+        return found
     share = np.linspace(rotor.root_cutout / rotor.blade_length, 1.0, OFFSET_POINTS)
     chord, quarter, centre = rotor.chord_at(share), rotor.quarter_at(share), rotor.centre_at(share)
-    found = []
     if float((np.maximum(np.abs(quarter), np.abs(centre)) / chord).max()) > MAX_OFFSET:
         found.append(f"{rotor.name}: sections more than {MAX_OFFSET:g} chords off the pitch axis, without torsion")
     if float(np.mean(share * (quarter - centre) / chord) / np.mean(share)) > MAX_TAIL_HEAVY:
         found.append(f"{rotor.name}: blades heavy behind the quarter chord, without flutter of elastic pitch")
     return found
+
+
+def _reduced_frequency(rotor: Rotor) -> float:
+    """Of one per revolution, at the section whose circulation is a state."""
+    radius = STATION * rotor.radius
+    return float(rotor.chord_at((radius - rotor.hinge_offset) / rotor.blade_length)) / (2.0 * radius)
 
 
 def slow_rotors(aircraft: Aircraft, speeds: Array) -> list[tuple[Rotor, float]]:
@@ -237,6 +267,7 @@ def _is_quiet(aircraft: Aircraft, working: Array) -> NDArray[np.bool_]:
         & (working[..., W.REVERSED] <= MAX_REVERSED)
         & (working[..., W.OUTSIDE] <= MAX_OUTSIDE)
         & (working[..., W.HEIGHT] >= LEAST_HEIGHTS.get(aircraft.ground.effect, -math.inf))
+        & (working[..., W.BEHIND] <= MAX_BEHIND)
         & (tips * (1.0 + working[..., W.ADVANCE_RATIO]) / sound <= limits)
         # no vortex ring before its slowest descent, and nothing beyond it
         & (working[..., W.DESCENT] < RING_DESCENT[0] * (1.0 - MARGIN) * working[..., W.HOVER_INFLOW])

@@ -58,6 +58,12 @@ class Compensator(ByContent):
     c: Array
     d: Array
 
+    def at(self, w: Array, tick: float) -> ComplexArray:
+        """Response at frequencies [rad/s] with a tick [s], shape (len(w), m, k)."""
+        inner = np.exp(1j * w * tick)[:, None, None] * np.eye(len(self.a)) - self.a
+        through = np.linalg.solve(inner, np.broadcast_to(self.b, (len(w), *self.b.shape)))
+        return np.asarray(self.d + self.c @ through)
+
 
 @dataclass(frozen=True)
 class Margin:
@@ -184,7 +190,7 @@ def margins(plant: Plant, compensator: Compensator, tick: float, delay: int) -> 
     for i in range(inputs):
         s = sensitivity[:, i, i]
         disk, worst = _least(np.abs(s - 0.5), w, stable)
-        found.append(Margin(disk, worst, *_classical(1.0 / s - 1.0)))
+        found.append(Margin(disk, worst, *reached(1.0 / s - 1.0)))
     size = np.linalg.norm(sensitivity - 0.5 * np.eye(inputs), ord=2, axis=(1, 2))
     disk, worst = _least(size, w, stable)
     return (*found, Margin(disk, worst, *disk_gains(disk), disk_phase(disk)))
@@ -217,13 +223,7 @@ def loop_gain(plant: Plant, compensator: Compensator, tick: float, delay: int, w
     for part in np.array_split(w, math.ceil(len(w) / BATCH)):
         z = np.exp(1j * part * tick)[:, None, None]
         response = plant.c @ np.linalg.solve(z * np.eye(len(a)) - a, np.broadcast_to(b, (len(part), *b.shape)))
-        own = compensator.d + np.zeros((len(part), 1, 1))
-        if len(compensator.a):
-            inner = z * np.eye(len(compensator.a)) - compensator.a
-            own = own + compensator.c @ np.linalg.solve(
-                inner, np.broadcast_to(compensator.b, (len(part), *compensator.b.shape))
-            )
-        result.append(-own @ response * z ** (-delay))
+        result.append(-compensator.at(part, tick) @ response * z ** (-delay))
     return np.concatenate(result)
 
 
@@ -232,7 +232,7 @@ def _least(size: Array, w: Array, stable: bool) -> tuple[float, float]:
     return (1.0 / float(size[index]) if stable else 0.0), float(w[index])
 
 
-def _classical(loop: ComplexArray) -> tuple[float, float, float]:
+def reached(loop: ComplexArray) -> tuple[float, float, float]:
     """Gain factors and phase at which a loop reaches -1, by linear interpolation between the frequencies."""
     before, after = loop[:-1], loop[1:]
     crossing = before.imag * after.imag < 0.0

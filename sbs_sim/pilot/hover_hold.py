@@ -308,12 +308,7 @@ class HoverHold:
         PilotError
             A number that is not finite.
         """
-        target = checks.array("position", position, PilotError)
-        if target.shape != (3,) or not np.all(np.abs(target) <= MAX_STATE_VALUE):
-            raise PilotError(
-                f"position = {checks.shown(target.tolist())}: allowed are 3 numbers up to {MAX_STATE_VALUE:g} m"
-            )
-        self._wanted = (target, checks.number("heading", heading, -MAX_STATE_VALUE, MAX_STATE_VALUE, "rad", PilotError))
+        self._wanted = checked_target(position, heading)
 
     def controls(self, time: float, body: ArrayLike) -> Array:
         """Pilot controls, shape (n_controls,), of a state.
@@ -372,6 +367,22 @@ class HoverHold:
         high, around = max(1.0, abs(error[2]) / REACH), max(1.0, abs(turn) / TURN_REACH)
         share = np.array([far, far, high, around])
         return np.append(error, turn) / share, share == 1.0
+
+
+def checked_target(position: ArrayLike, heading: float) -> tuple[Array, float]:
+    """Position, NED [m], shape (3,), and heading [rad] of a target, if they are finite.
+
+    Raises
+    ------
+    PilotError
+        They are not.
+    """
+    target = checks.array("position", position, PilotError)
+    if target.shape != (3,) or not np.all(np.abs(target) <= MAX_STATE_VALUE):
+        raise PilotError(
+            f"position = {checks.shown(target.tolist())}: allowed are 3 numbers up to {MAX_STATE_VALUE:g} m"
+        )
+    return target, checks.number("heading", heading, -MAX_STATE_VALUE, MAX_STATE_VALUE, "rad", PilotError)
 
 
 def checked_body(time: float, body: ArrayLike) -> Array:

@@ -14,7 +14,8 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import PilotError
 from sbs_sim.flight.history import History, history
 from sbs_sim.flight.mixer import Mixer
-from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.stitched import StitchedModel
+from sbs_sim.flight.stitched_simulation import begun
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.wind import Wind
@@ -32,6 +33,7 @@ def simulate_with_pilot(
     *,
     wind: Wind | None = None,
     delay: int = 0,
+    model: StitchedModel | None = None,
     **options: Any,
 ) -> History:
     """Fly for a while with a pilot who sees every state.
@@ -50,8 +52,10 @@ def simulate_with_pilot(
     delay : int
         Ticks between a state and the controls that it gives, 0 to 100. Before them there are those of the trim point,
         or of a state the first ones that the pilot gives.
+    model : StitchedModel, optional
+        A stitched model of the aircraft, which then flies in place of the full one.
     **options
-        See `Simulation`.
+        See `Simulation`, with a stitched model `StitchedSimulation`.
 
     Returns
     -------
@@ -80,8 +84,8 @@ def simulate_with_pilot(
         state = checks.array("start", start, PilotError)
     given = [_asked(aircraft, pilot, 0.0, state)]
     mixer.set_target(given[0])
-    simulation = Simulation(aircraft, state, mixer.move(0.0), wind=wind, **options)
-    snapshots, clipped = [], dict[str, None]()
+    simulation = begun(aircraft, model, state, mixer.move(0.0), wind=wind, **options)
+    snapshots, clipped = [], dict.fromkeys(() if model is None else model.warnings)
     for tick in range(round(duration / simulation.tick) + 1):
         if tick > 0:
             simulation.advance()

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from sbs_sim.analysis.qualities import Qualities, qualities
     from sbs_sim.analysis.sweep import Sweep, sweep
     from sbs_sim.analysis.trim import trim
+    from sbs_sim.flight.controller import Controller, Sensors
     from sbs_sim.flight.engine_failure import EngineFailure
     from sbs_sim.flight.simulate import simulate
     from sbs_sim.flight.simulation import Simulation
@@ -29,6 +30,8 @@ _HOME = {
     "Batch": "sbs_sim.analysis.batch",
     "Case": "sbs_sim.analysis.batch",
     "simulate_batch": "sbs_sim.analysis.batch",
+    "Controller": "sbs_sim.flight.controller",
+    "Sensors": "sbs_sim.flight.controller",
     "EngineFailure": "sbs_sim.flight.engine_failure",
     "LinearModel": "sbs_sim.analysis.linear_model",
     "linearize": "sbs_sim.analysis.linearize",
@@ -45,9 +48,11 @@ __all__ = [
     "Aircraft",
     "Batch",
     "Case",
+    "Controller",
     "EngineFailure",
     "LinearModel",
     "Qualities",
+    "Sensors",
     "Simulation",
     "Sweep",
     "TrimPoint",
@@ -63,7 +68,18 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Import the public names when they are first used: the compiler behind them takes its time."""
     if name == "__version__":
-        return importlib.import_module("importlib.metadata").version("sbs_sim")
+        return _version()
     if name in _HOME:
         return getattr(importlib.import_module(_HOME[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def _version() -> str:
+    """Version of these sources: of package.xml beside them, which is that of a checkout, else of what was installed."""
+    from importlib.metadata import version
+    from pathlib import Path
+    from xml.etree import ElementTree
+
+    manifest = Path(__file__).resolve().parents[1] / "package.xml"
+    found = ElementTree.parse(manifest).findtext("version") if manifest.is_file() else None
+    return found or version("sbs_sim")

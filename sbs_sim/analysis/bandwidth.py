@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sbs_sim.analysis.frequency_response import Transfer
+from sbs_sim.analysis.frequency_response import Actuator, Transfer
 from sbs_sim.content import ByContent
 from sbs_sim.errors import LinearizationError
 
@@ -87,7 +87,12 @@ class Bandwidth(ByContent):
 
 
 def bandwidth(
-    model: LinearModel, input_name: str, output_name: str, delay: float = 0.0, is_rate_command: bool = True
+    model: LinearModel,
+    input_name: str,
+    output_name: str,
+    delay: float = 0.0,
+    is_rate_command: bool = True,
+    actuator: Actuator | None = None,
 ) -> Bandwidth:
     """Bandwidth and phase delay of a linear model.
 
@@ -100,6 +105,8 @@ def bandwidth(
         Of sensors, computers and the like [s].
     is_rate_command : bool
         The aircraft answers to a step by a rate, as without augmentation; else by an attitude.
+    actuator : Actuator, optional
+        Between the control and the model.
 
     Returns
     -------
@@ -110,7 +117,8 @@ def bandwidth(
     LinearizationError
         A name that the model does not have, a delay out of range, or an output that the control does not move.
     """
-    return bandwidth_of(Transfer.of(model, input_name, output_name, delay), input_name, output_name, is_rate_command)
+    transfer = Transfer.of(model, input_name, output_name, delay, actuator)
+    return bandwidth_of(transfer, input_name, output_name, is_rate_command)
 
 
 def bandwidth_of(transfer: Transfer, input_name: str, output_name: str, is_rate_command: bool = True) -> Bandwidth:
@@ -165,6 +173,8 @@ def _search(transfer: Transfer) -> tuple[Array, int]:
         turned = math.pi / transfer.delay
         slowest = slowest if len(growing) else min(slowest, LOWEST * turned)
         fastest, last = max(fastest, turned), max(last, HIGHEST * turned)
+    if transfer.actuator is not None:
+        fastest, last = max(fastest, transfer.actuator.frequency), max(last, HIGHEST * transfer.actuator.frequency)
     grid = np.geomspace(slowest, last, POINTS)
     return grid, min(int(np.searchsorted(grid, fastest)), POINTS - 2)
 

@@ -23,9 +23,10 @@ from sbs_sim.analysis.trim import solve_trim, trim
 from sbs_sim.concurrency.parallel import Execution, compute
 from sbs_sim.content import ByContent
 from sbs_sim.errors import BatchError, SbsError
+from sbs_sim.flight.controller import Controller
 from sbs_sim.flight.controls import Commands
 from sbs_sim.flight.power_balance import POWER_BALANCE
-from sbs_sim.flight.sortie import Sortie, fly_together, structure
+from sbs_sim.flight.sortie import Sortie, fly_together
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import euler_angles
@@ -60,7 +61,7 @@ class Case(ByContent):
     start : TrimPoint, ndarray of shape (size,), TrimCondition or mapping
         See `sbs_sim.simulate`. In a TrimCondition the aircraft of this flight is trimmed, with the fidelity of the
         batch; a mapping holds arguments of `sbs_sim.trim`, {"airspeed": 15.0}.
-    controls : array_like or callable, optional
+    controls : array_like, callable or Controller, optional
         See `sbs_sim.simulate`; those of the trim if not given.
     wind : Wind
     changes : mapping
@@ -70,7 +71,7 @@ class Case(ByContent):
 
     aircraft: Aircraft
     start: Start
-    controls: Commands | None = None
+    controls: Commands | Controller | None = None
     wind: Wind = field(default_factory=Wind)
     changes: Mapping[str, Any] = field(default_factory=dict)
 
@@ -377,7 +378,7 @@ def _side_by_side(sorties: Mapping[int, Sortie]) -> Iterator[list[int]]:
     """Flights of one structure together; few of them are faster one after the other."""
     alike: dict[Any, list[int]] = defaultdict(list)
     for i, sortie in sorties.items():
-        alike[structure(sortie.simulation)].append(i)
+        alike[sortie.structure].append(i)
     for numbers in alike.values():
         if 2 * len(numbers) > lane_count():
             yield numbers
@@ -388,7 +389,7 @@ def _side_by_side(sorties: Mapping[int, Sortie]) -> Iterator[list[int]]:
 def _sortie(
     aircraft: Aircraft,
     start: Start,
-    controls: Commands | None,
+    controls: Commands | Controller | None,
     wind: Wind,
     changes: dict[str, Any],
     plan: Plan,

@@ -46,7 +46,7 @@ def _state_step(name: str) -> float:
     part = S.part_of(name)
     if part.family == "body":
         return BODY_STEPS[name]
-    if part.family == "inflow":
+    if part.family in ("inflow", "wake"):
         return INFLOW_STEP
     return BLADE_RATE_STEP if part.is_rate else BLADE_STEP
 

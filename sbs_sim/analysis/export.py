@@ -1,4 +1,4 @@
-"""Trims and linear models as files and for other programs: .npz, .mat, .json, python-control.
+"""Trims and linear models as files and for other programs: .npz, .mat, .json, C headers, python-control.
 
 Names and order are those of `TrimPoint` and `LinearModel`, SI units and radians; poles, modes and blocks come along.
 """
@@ -19,6 +19,7 @@ from sbs_sim.output.json_text import plain, to_json
 if TYPE_CHECKING:
     from sbs_sim.analysis.linear_model import LinearModel
     from sbs_sim.analysis.modes import Mode
+    from sbs_sim.analysis.reduced import ReducedModel
     from sbs_sim.analysis.sweep import Sweep
 
 
@@ -44,7 +45,7 @@ def model_to_dict(model: "LinearModel", with_trim: bool = True) -> dict[str, Any
     return dict(plain({**contents, "modes": [_mode_contents(mode) for mode in model.modes]}))
 
 
-def to_control(model: "LinearModel") -> Any:
+def to_control(model: "LinearModel | ReducedModel") -> Any:
     """Linear model as a `control.StateSpace` of python-control, with names of states, inputs and outputs.
 
     Raises
@@ -137,7 +138,87 @@ def _json(model: "LinearModel") -> bytes:
     return to_json(model_to_dict(model)).encode()
 
 
-ENCODERS: dict[str, Callable[["LinearModel"], bytes]] = {".npz": _npz, ".mat": _mat, ".json": _json}
+def c_header(model: "LinearModel | ReducedModel") -> str:
+    """Matrices, and names and units as comments, as a header for C99 and C++; nothing in it is computed.
+
+    Rows of a matrix are rows of the array. An identifier begins with `sbs_model_`.
+    """
+    sizes = {"STATES": len(model.a), "INPUTS": model.b.shape[1], "OUTPUTS": len(model.c)}
+    lines = [
+        "/* Linear model x' = A x + B u, y = C x + D u for small departures from a trim, written by sbs_sim.",
+        " * SI units and radians. Rows of A and B are states, of C and D outputs; columns are states or inputs. */",
+        "#ifndef SBS_MODEL_H",
+        "#define SBS_MODEL_H",
+        "",
+        *(f"#define SBS_MODEL_{name} {value}" for name, value in sizes.items()),
+    ]
+    ends = {
+        "states": (model.state_names, model.state_units),
+        "inputs": (model.control_names, model.control_units),
+        "outputs": (model.output_names, model.output_units),
+    }
+    for what, (names, units) in ends.items():
+        lines += ["", f"/* {what}: index, name [unit]"]
+        lines += [
+            f" * {i} {_comment(name)} [{_comment(unit)}]"
+            for i, (name, unit) in enumerate(zip(names, units, strict=True))
+        ]
+        lines[-1] += " */"
+    shapes = {
+        "a": ("STATES", "STATES"),
+        "b": ("STATES", "INPUTS"),
+        "c": ("OUTPUTS", "STATES"),
+        "d": ("OUTPUTS", "INPUTS"),
+    }
+    for name, (rows, columns) in shapes.items():
+        lines += ["", f"static const double sbs_model_{name}[SBS_MODEL_{rows}][SBS_MODEL_{columns}] = {{"]
+        lines += [f"    {{{', '.join(repr(value) for value in row)}}}," for row in getattr(model, name).tolist()]
+        lines += ["};"]
+    return "\n".join([*lines, "", "#endif /* SBS_MODEL_H */", ""])
+
+
+def _comment(text: str) -> str:
+    """A name from a file, which must not end a comment."""
+    return re.sub(r"[^\w(). ^/'\[\]-]", "_", text)
+
+
+def _header(model: "LinearModel | ReducedModel") -> bytes:
+    return c_header(model).encode()
+
+
+def _small(model: "ReducedModel") -> dict[str, Any]:
+    return {**_fields(model), "poles": model.poles}
+
+
+def _small_npz(model: "ReducedModel") -> bytes:
+    arrays: dict[str, Any] = {
+        name: np.array(value, dtype=str) if _is_names(value) else np.asarray(value)
+        for name, value in _small(model).items()
+    }
+    file = io.BytesIO()
+    np.savez_compressed(file, **arrays)
+    return file.getvalue()
+
+
+def _small_mat(model: "ReducedModel") -> bytes:
+    from scipy.io import savemat
+
+    file = io.BytesIO()
+    savemat(file, _for_matlab(_small(model)), long_field_names=True, oned_as="column", do_compression=True)
+    return file.getvalue()
+
+
+def _small_json(model: "ReducedModel") -> bytes:
+    return to_json(_small(model)).encode()
+
+
+ENCODERS: dict[str, Callable[["LinearModel"], bytes]] = {".npz": _npz, ".mat": _mat, ".json": _json, ".h": _header}
+STATE_SPACE_ENCODERS: dict[str, Callable[["ReducedModel"], bytes]] = {
+    ".npz": _small_npz,
+    ".mat": _small_mat,
+    ".json": _small_json,
+    ".h": _header,
+}
 
 
 def sweep_to_csv(sweep: "Sweep") -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations  # `help` then shows types by their names
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +28,43 @@ MAX_TURN = np.radians(30.0)  # of the phase from one frequency of a fine grid to
 FIRST_POINTS, SETTLED_POINTS, MAX_POINTS, MAX_HALVINGS = 100, 200, 5000, 20  # of such grids
 FAST = 1e4  # over the fastest pole: there a response is its asymptote
 DECIBELS = 20.0
+DAMPINGS = (0.05, 10.0)  # of actuators
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """Lag of actuators between a control and the pitch of the blades, 1 / (s^2 + 2 damping s + 1), s in `frequency`.
+
+    Attributes
+    ----------
+    frequency : float
+        Natural frequency, 1e-4 to 1e5 [rad/s].
+    damping : float
+        Ratio, 0.05 to 10.
+
+    Raises
+    ------
+    LinearizationError
+        A value out of range.
+    """
+
+    frequency: float
+    damping: float = 0.7
+
+    def __post_init__(self) -> None:
+        checks.number("actuator.frequency", self.frequency, *FREQUENCIES, "rad/s", LinearizationError)
+        checks.number("actuator.damping", self.damping, *DAMPINGS, "", LinearizationError)
+
+    def at(self, frequencies: Array) -> ComplexArray:
+        """Complex response at frequencies [rad/s]; its phase falls from 0 to -180 deg."""
+        s = 1j * frequencies / self.frequency
+        return np.asarray(1.0 / (s * s + 2.0 * self.damping * s + 1.0))
+
+    @property
+    def matrix(self) -> Array:
+        """Rates of deflection and its speed by these and by the command, shape (2, 3)."""
+        square = self.frequency**2
+        return np.array([[0.0, 1.0, 0.0], [-square, -2.0 * self.damping * self.frequency, square]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +85,8 @@ class FrequencyResponse(ByContent):
     input_name, input_unit, output_name, output_unit : str
     delay : float
         That the response contains beside the model [s].
+    actuator : Actuator, optional
+        Likewise.
     """
 
     frequencies: Array
@@ -58,6 +97,7 @@ class FrequencyResponse(ByContent):
     output_name: str
     output_unit: str
     delay: float = 0.0
+    actuator: Actuator | None = None
 
     @property
     def gain(self) -> Array:
@@ -83,6 +123,7 @@ class FrequencyResponse(ByContent):
             "output": self.output_name,
             "output_unit": self.output_unit,
             "delay": self.delay,
+            "actuator": None if self.actuator is None else asdict(self.actuator),
             "frequency": self.frequencies.tolist(),
             "gain": self.gain.tolist(),
             "phase": self.phase.tolist(),
@@ -90,9 +131,14 @@ class FrequencyResponse(ByContent):
 
 
 def frequency_response(
-    model: LinearModel, input_name: str, output_name: str, frequencies: Any = None, delay: float = 0.0
+    model: LinearModel,
+    input_name: str,
+    output_name: str,
+    frequencies: Any = None,
+    delay: float = 0.0,
+    actuator: Actuator | None = None,
 ) -> FrequencyResponse:
-    """Response of an output or state to a control, C (i omega - A)^-1 B + D times exp(-i omega delay).
+    """Response of an output or state to a control, C (i omega - A)^-1 B + D times exp(-i omega delay) and an actuator.
 
     Parameters
     ----------
@@ -105,6 +151,8 @@ def frequency_response(
         Rising, 1e-4 to 1e5 [rad/s]; by default 200 from a tenth of the slowest to three times the fastest pole.
     delay : float
         Of sensors, computers and the like [s].
+    actuator : Actuator, optional
+        Between the control and the model.
 
     Returns
     -------
@@ -115,7 +163,7 @@ def frequency_response(
     LinearizationError
         A name that the model does not have, or frequencies or a delay out of range.
     """
-    transfer = Transfer.of(model, input_name, output_name, delay)
+    transfer = Transfer.of(model, input_name, output_name, delay, actuator)
     if frequencies is None:
         frequencies = default_frequencies(model)
     asked = _checked(frequencies)
@@ -128,6 +176,7 @@ def frequency_response(
         output_name,
         _output_unit(model, output_name),
         transfer.delay,
+        actuator,
     )
 
 
@@ -157,7 +206,7 @@ def _output_unit(model: LinearModel, name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Transfer(ByContent):
-    """One element of a transfer matrix, C (s - A)^-1 B + D, behind a delay.
+    """One element of a transfer matrix, C (s - A)^-1 B + D, behind a delay and an actuator.
 
     Attributes
     ----------
@@ -166,6 +215,7 @@ class Transfer(ByContent):
     d, delay : float
     settled : Transfer, optional
         The same with settled rotors and inflow, which says on which turn the phase is; None: the response itself.
+    actuator : Actuator, optional
     """
 
     a: Array
@@ -174,9 +224,17 @@ class Transfer(ByContent):
     d: float
     delay: float = 0.0
     settled: Transfer | None = None
+    actuator: Actuator | None = None
 
     @classmethod
-    def of(cls, model: LinearModel, input_name: str, output_name: str, delay: float = 0.0) -> Transfer:
+    def of(
+        cls,
+        model: LinearModel,
+        input_name: str,
+        output_name: str,
+        delay: float = 0.0,
+        actuator: Actuator | None = None,
+    ) -> Transfer:
         """From a control to an output or state of a model.
 
         Raises
@@ -188,7 +246,7 @@ class Transfer(ByContent):
         names = tuple(dict.fromkeys((*model.output_names, *model.state_names)))
         checks.choice("output", output_name, names, LinearizationError)
         delay = checks.number("delay", delay, 0.0, MAX_DELAY, "s", LinearizationError)
-        transfer = cls._element(model, input_name, output_name, delay)
+        transfer = replace(cls._element(model, input_name, output_name, delay), actuator=actuator)
         flies = not isinstance(model.trim, StandPoint) and set(S.LINEAR_BODY_NAMES) <= set(model.state_names)
         if not flies or output_name not in model.output_names:
             return transfer
@@ -212,12 +270,18 @@ class Transfer(ByContent):
 
     def at(self, frequencies: Array) -> ComplexArray:
         """Complex response at frequencies [rad/s], shape (n,)."""
-        return np.asarray(self._undelayed(frequencies) * np.exp(-1j * frequencies * self.delay))
+        lag = 1.0 if self.actuator is None else self.actuator.at(frequencies)
+        return np.asarray(self._undelayed(frequencies) * np.exp(-1j * frequencies * self.delay) * lag)
 
     def _undelayed(self, frequencies: Array) -> ComplexArray:
-        shifted = 1j * frequencies[:, None, None] * np.eye(len(self.a)) - self.a
-        states = np.linalg.solve(shifted, self.b.astype(complex)[None, :, None])[..., 0]
-        return np.asarray(states @ self.c + self.d)
+        states = substituted(*self._triangular[:2], 1j * np.asarray(frequencies, complex))
+        return np.asarray(self._triangular[2] @ states + self.d)
+
+    @cached_property
+    def _triangular(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """A, b and c of the states in which A is triangular."""
+        triangle, ahead, behind = triangular(self.a)
+        return triangle, np.asarray(ahead @ self.b), np.asarray(self.c @ behind)
 
     def phase(self, frequencies: Array) -> Array:
         """Continuous phase at rising frequencies [rad], shape (n,); see `FrequencyResponse.phase`."""
@@ -225,7 +289,8 @@ class Transfer(ByContent):
         grid = self._fine_grid(np.union1d(frequencies, low))
         phase = np.unwrap(np.angle(self._undelayed(grid)))
         phase += TURN * (round((self._first_phase(low) - phase[0]) / TURN))
-        return np.asarray(phase[np.searchsorted(grid, frequencies)] - frequencies * self.delay)
+        lag = 0.0 if self.actuator is None else np.angle(self.actuator.at(frequencies))
+        return np.asarray(phase[np.searchsorted(grid, frequencies)] - frequencies * self.delay + lag)
 
     def _first_phase(self, low: float) -> float:
         """Phase at a low frequency, on the turn that the end of the response with settled rotors says [rad]."""
@@ -264,6 +329,23 @@ class Transfer(ByContent):
                 break
             grid = np.union1d(grid, np.sqrt(grid[:-1] * grid[1:])[steep])
         return grid
+
+
+def triangular(a: ComplexArray | Array) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Schur form T of a balanced matrix, shape (n, n), and L, R with T = L a R and L R = 1."""
+    from scipy.linalg import matrix_balance, schur  # here: a trim has no use for it, and it is slow to import
+
+    _, (units, _) = matrix_balance(np.abs(a), permute=False, separate=True)
+    triangle, turn = schur(a * (units / units[:, None]), output="complex")
+    return triangle, turn.conj().T / units, units[:, None] * turn
+
+
+def substituted(triangle: ComplexArray, right: ComplexArray, shifts: ComplexArray) -> ComplexArray:
+    """Solutions of (shift - triangle) x = right for shifts, shape (n, m): the last first, for all shifts at once."""
+    found = np.empty((len(triangle), len(shifts)), complex)
+    for i in reversed(range(len(triangle))):
+        found[i] = (right[i] + triangle[i, i + 1 :] @ found[i + 1 :]) / (shifts - triangle[i, i])
+    return found
 
 
 def _slowest(poles: ComplexArray, otherwise: float) -> float:

@@ -123,8 +123,9 @@ class IsolatedRotor:
         lag = (index[layout.lag(0)], index[layout.lag_rate(0)]) if self.fidelity.lead_lag else (index[:0], index[:0])
         sprung = self._free[self.aircraft.body.stand_spring[self._free] > 0.0]
         speed = [layout.drive(0)[S.SPEED]] if self.is_driven else index[:0]
-        places = np.concatenate([DEFLECTIONS[sprung], index[layout.flap(0)], lag[0], inflow, speed])
-        return places, np.concatenate([S.VELOCITY + sprung, index[layout.flap_rate(0)], lag[1], inflow, speed])
+        first_order = np.concatenate([inflow, index[layout.wake(0)], speed])
+        places = np.concatenate([DEFLECTIONS[sprung], index[layout.flap(0)], lag[0], first_order])
+        return places, np.concatenate([S.VELOCITY + sprung, index[layout.flap_rate(0)], lag[1], first_order])
 
     def _is_inflow(self, places: IntArray) -> NDArray[np.bool_]:
         """Which indices in the state are those of inflow."""

@@ -16,7 +16,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis import export
 from sbs_sim.analysis.bandwidth import Bandwidth, bandwidth
 from sbs_sim.analysis.control_effects import ControlEffect, control_effects
-from sbs_sim.analysis.frequency_response import FrequencyResponse, frequency_response
+from sbs_sim.analysis.frequency_response import Actuator, FrequencyResponse, frequency_response
 from sbs_sim.analysis.modes import Mode, modes
 from sbs_sim.content import ByContent
 from sbs_sim.errors import ExportError, LinearizationError
@@ -200,7 +200,12 @@ class LinearModel(ByContent):
         return found
 
     def frequency_response(
-        self, input_name: str, output_name: str, frequencies: Any = None, delay: float = 0.0
+        self,
+        input_name: str,
+        output_name: str,
+        frequencies: Any = None,
+        delay: float = 0.0,
+        actuator: Actuator | None = None,
     ) -> FrequencyResponse:
         """Gain and phase of an output or state over frequency; see `sbs_sim.analysis.frequency_response`.
 
@@ -212,16 +217,23 @@ class LinearModel(ByContent):
             Rising [rad/s]; by default 200 that show all poles.
         delay : float
             Of sensors, computers and the like [s].
+        actuator : Actuator, optional
+            Between the control and the model.
 
         Raises
         ------
         LinearizationError
             A name that the model does not have, or frequencies or a delay out of range.
         """
-        return frequency_response(self, input_name, output_name, frequencies, delay)
+        return frequency_response(self, input_name, output_name, frequencies, delay, actuator)
 
     def bandwidth(
-        self, input_name: str, output_name: str, delay: float = 0.0, is_rate_command: bool = True
+        self,
+        input_name: str,
+        output_name: str,
+        delay: float = 0.0,
+        is_rate_command: bool = True,
+        actuator: Actuator | None = None,
     ) -> Bandwidth:
         """Bandwidth and phase delay of an attitude after ADS-33E-PRF; see `sbs_sim.analysis.bandwidth`.
 
@@ -230,7 +242,7 @@ class LinearModel(ByContent):
         LinearizationError
             A name that the model does not have, a delay out of range, or an output that the control does not move.
         """
-        return bandwidth(self, input_name, output_name, delay, is_rate_command)
+        return bandwidth(self, input_name, output_name, delay, is_rate_command, actuator)
 
     def save(self, path: str | Path) -> None:
         """Write the model to a file of the kind that its suffix says.
@@ -240,7 +252,7 @@ class LinearModel(ByContent):
         path : str or Path
             ".npz": arrays by name, what belongs to the trim and the blocks as "trim.pitch", "blocks.A_B-B".
             ".mat": the same for Matlab and Octave, trim and blocks as structures, names as cells; what an identifier
-            cannot hold is an underscore there. ".json": see `to_dict`.
+            cannot hold is an underscore there. ".json": see `to_dict`. ".h": matrices as a C header.
 
         Raises
         ------

@@ -20,6 +20,7 @@ from sbs_sim.analysis.kinematics import kinematics
 from sbs_sim.analysis.linear_model import LinearModel
 from sbs_sim.analysis.linear_outputs import load_outputs, relative_spread
 from sbs_sim.analysis.paper_method import blocks
+from sbs_sim.analysis.periodic import in_place_of_a_model
 from sbs_sim.analysis.stand_model import StandModel
 from sbs_sim.analysis.trim import Guess, trim
 from sbs_sim.errors import LinearizationError
@@ -138,8 +139,7 @@ def _check_blades(aircraft: Aircraft) -> None:
     for rotor in aircraft.rotors:
         if rotor.blades == 2:
             raise LinearizationError(
-                f"{rotor.name} has 2 blades: no constant model describes them; stability is that of Floquet's method,"
-                " linearize --floquet or sbs_sim.analysis.floquet"
+                f"{rotor.name} has 2 blades: no constant model describes them; {in_place_of_a_model(aircraft)}"
             )
 
 
@@ -151,7 +151,7 @@ def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> Linear
     used = used_states(point)
     size = len(point.state)
     inputs = np.concatenate([used, size + np.arange(len(aircraft.controls))])
-    outputs, names, units = _outputs(aircraft, point, mean)
+    outputs, names, units = model_outputs(aircraft, point, mean)
     weights = np.zeros((size, size))
     weights[np.ix_(used, used)] = steps[used] / steps[used, None]
     return LinearModel(
@@ -176,7 +176,7 @@ def _averaged(aircraft: Aircraft, point: TrimPoint, step_scale: float) -> Linear
     )
 
 
-def _outputs(aircraft: Aircraft, point: TrimPoint, mean: Array) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
+def model_outputs(aircraft: Aircraft, point: TrimPoint, mean: Array) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
     """Rows of C and D by all states and controls, with names and units."""
     size, inputs = len(point.state), mean.shape[1]
     rows, names, units = load_outputs(aircraft, point, mean[size:], (*point.state_names, *aircraft.control_names))

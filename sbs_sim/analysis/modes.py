@@ -631,6 +631,8 @@ def _rotor_label(
 def _family_name(family: str, harmonic: int) -> str:
     if family == "inflow":
         return "cyclic inflow" if harmonic else "uniform inflow"
+    if family == "wake" and harmonic >= 0:
+        return ("collective wake", "wake")[harmonic] if harmonic < 2 else f"wake {harmonic}"
     if harmonic == 0:
         return "coning" if family == "flap" else "collective lag"
     if harmonic == -1:

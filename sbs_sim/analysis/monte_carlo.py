@@ -4,7 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.paths import unit_of
 from sbs_sim.analysis.batch import Batch, Case, percentiles
 from sbs_sim.errors import BatchError
+from sbs_sim.flight.controller import Controller
 from sbs_sim.flight.trim_point import LIMITS, TrimCondition
 from sbs_sim.model import state as S
 from sbs_sim.model.frames import quaternion_to_euler
@@ -39,8 +40,9 @@ def gust_cases(
     seed: int = 0,
     spread: Mapping[str, float] | None = None,
     air: Mapping[str, Any] | None = None,
+    controller: Controller | None = None,
 ) -> list[Case]:
-    """Flights with the controls of their trims, each through Dryden turbulence of its own.
+    """Flights with the controls of their trims, or a controller, each through Dryden turbulence of its own.
 
     Parameters
     ----------
@@ -59,6 +61,8 @@ def gust_cases(
         normally distributed around it.
     air : mapping of str to object, optional
         Further fields of the `Wind` of every flight, or others in place of those: {"turbulence_extent": "field"}.
+    controller : Controller, optional
+        Flies each of them, in place of the controls of the trims; the errors of its sensors have a seed of each flight.
 
     Returns
     -------
@@ -102,7 +106,10 @@ def gust_cases(
         scattered = zip(centres.items(), numbers, strict=False)
         changes = {path: mean * (1.0 + share * number) for (path, (mean, share)), number in scattered}
         start = condition if isinstance(condition, TrimCondition) else given
-        cases.append(Case(aircraft, start, wind=wind, changes=changes))
+        flown = None
+        if controller is not None:
+            flown = replace(controller, sensors=replace(controller.sensors, seed=source.random_raw() >> 1))
+        cases.append(Case(aircraft, start, flown, wind, changes))
     return cases
 
 

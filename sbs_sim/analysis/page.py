@@ -39,18 +39,37 @@ def save_page(report: Report, folder: str | Path, *, progress: Callable[[int, in
         Folder or files cannot be written.
     """
     folder = make_folder(folder)
-    written, shown = [], {}
-    every = drawings(report)
-    for done, drawing in enumerate(every, 1):
-        for kind, content in drawing.encoded().items():
+    written, shown = save_drawings(drawings(report), folder, progress)
+    page = folder / PAGE
+    write(page, page_text(report, shown))
+    return [*written, page]
+
+
+def save_drawings(
+    drawings: Sequence[Drawing], folder: Path, progress: Callable[[int, int], None] | None = None
+) -> tuple[list[Path], list[tuple[Drawing, str]]]:
+    """Write figures as PNG and SVG into a folder that there is; the files, and each drawing with its SVG.
+
+    Raises
+    ------
+    ExportError
+        A file cannot be written.
+    """
+    written, shown = [], []
+    for done, drawing in enumerate(drawings, 1):
+        encoded = drawing.encoded()
+        for kind, content in encoded.items():
             written.append(folder / f"{drawing.name}.{kind}")
             write(written[-1], content)
-            shown[drawing.name] = content
+        shown.append((drawing, encoded["svg"].decode()))
         if progress is not None:
-            progress(done, len(every))
-    page = folder / PAGE
-    write(page, page_text(report, [(drawing, shown[drawing.name].decode()) for drawing in every]))
-    return [*written, page]
+            progress(done, len(drawings))
+    return written, shown
+
+
+def inline_drawing(drawing: Drawing, svg: str) -> str:
+    """SVG of a drawing as an element of a page, with its caption as what those hear who do not see it."""
+    return inline_svg(svg, drawing.name, escape(drawing.caption, quote=True))
 
 
 def make_folder(folder: str | Path) -> Path:

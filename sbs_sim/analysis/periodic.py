@@ -27,6 +27,8 @@ IntArray = NDArray[np.int64]
 Rates = Callable[[Engine, Array, Array, Array], Array]
 
 STEP = 0.13  # rad, of the fastest rotor, and of the fastest free vibration of a blade
+STABLE = 1.5  # of a step times what decays at once: Runge-Kutta's method holds it up to 2.8
+FAST_FLIGHT = 2.3  # of the velocity of a section in hover: on the advancing side at an advance ratio of 1
 MAX_STEPS = 20000
 MAX_PASSAGES = 60  # of any rotor in one common period
 LOOSE = 1e-9  # of a residual: what differences over a period leave
@@ -50,7 +52,9 @@ def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
         There is none of at most 60 passages, or rotors turn at speeds of their own.
     """
     if aircraft.drives and (len(aircraft.drives) > 1 or len(aircraft.drives[0].rotors) < len(aircraft.rotors)):
-        raise LinearizationError("rotors whose speeds are their own have no common period")
+        raise LinearizationError(
+            "rotors whose speeds are their own have no common period: allowed are all rotors on one drive, or no drives"
+        )
     blades = np.array([rotor.blades for rotor in aircraft.rotors])
     each = blades // np.array(aircraft.passages)
     passage = each * 2.0 * math.pi / (blades * np.array([rotor.speed for rotor in aircraft.rotors]))
@@ -60,6 +64,17 @@ def common_period(aircraft: Aircraft) -> tuple[float, list[int]]:
         if np.all(np.abs(numbers * passage - period) < 1e-9 * period):
             return period, [int(number) for number in numbers * each]
     raise LinearizationError(f"the blade passages of the rotors have no common period of up to {MAX_PASSAGES} of them")
+
+
+def in_place_of_a_model(aircraft: Aircraft) -> str:
+    """What there is of rotors with two blades in place of a constant linear model, in words for an error."""
+    if aircraft.body.is_stand:
+        return "stability of a rotor alone on a stand is sbs_sim.analysis.isolated_rotor.IsolatedRotor.exponents"
+    try:
+        common_period(aircraft)
+    except LinearizationError as error:
+        return f"{error}, so that Floquet's method does not apply either; there are `trim` in the mean and `simulate`"
+    return "stability is that of Floquet's method, linearize --floquet or sbs_sim.analysis.floquet"
 
 
 def flown_period(aircraft: Aircraft, point: TrimPoint) -> float:
@@ -204,7 +219,7 @@ def _fastest(rotor: Rotor) -> float:
     flap = math.sqrt(rotor.speed**2 * offset + rotor.flap_spring / second)
     lag = math.sqrt(rotor.speed**2 * offset + (rotor.lag_spring + rotor.lag_stop_spring) / lag_inertia)
     damping = rotor.lag_damping * float(rotor.lag_damping_factors.max()) + rotor.lag_stop_damping
-    return max(flap, lag, damping / lag_inertia)
+    return max(flap, lag, damping / lag_inertia, FAST_FLIGHT * rotor.wake_rate * STEP / STABLE)
 
 
 def _rotor_states(aircraft: Aircraft, fidelity: Fidelity) -> tuple[IntArray, Array]:
@@ -220,6 +235,7 @@ def _rotor_states(aircraft: Aircraft, fidelity: Fidelity) -> tuple[IntArray, Arr
             places += index[part(j)].tolist()
             scales += [scale] * rotor.blades
         inflow = index[aircraft.layout.inflow(j)][: 3 if fidelity.cyclic_inflow else 1].tolist()
+        inflow += index[aircraft.layout.wake(j)].tolist()
         places, scales = places + inflow, scales + [1.0] * len(inflow)
     for i, drive in enumerate(aircraft.drives):
         own = {S.SPEED: aircraft.drive_speed(i), S.ENGINE_TORQUE: drive.max_torque, S.GOVERNOR: 1.0}
@@ -238,6 +254,8 @@ def solved(residuals: Callable[[Array], Array], size: int, what: str) -> Array:
 
     found = newton(lambda values: residuals(values[np.newaxis])[0], np.zeros(size), slopes)
     left = float(np.abs(found.residual).max())
+    if not math.isfinite(left):
+        raise TrimError(f"no periodic motion of {what}: it leaves what is plausible within a period")
     if not (found.converged or left < LOOSE):
         raise TrimError(f"no periodic motion of {what}: largest residual {left:.3g}")
     return found.values

@@ -1,13 +1,13 @@
 """Flying qualities of an aircraft over airspeed, from its linear models (theory.md section 9.13).
 
-What is judged is the aircraft as its file describes it, flown by its controls: without a controller, a bare airframe.
+What is judged is the aircraft as its file describes it, flown by its controls, or with a control law in the loop.
 """
 
 from __future__ import annotations  # `help` then shows types by their names
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.bandwidth import Bandwidth, bandwidth_of
-from sbs_sim.analysis.frequency_response import MAX_DELAY, Transfer
+from sbs_sim.analysis.frequency_response import MAX_DELAY, Actuator, Transfer
+from sbs_sim.analysis.linear_loop import PATH, LawOf, LinearLaw, LinearLoop, linear_loop
 from sbs_sim.analysis.linear_model import LinearModel
 from sbs_sim.analysis.modes import LONGITUDINAL, Mode
 from sbs_sim.analysis.quality_limits import ANY, FORWARD, Limits, Scale, limits, scales
+from sbs_sim.analysis.quickness import Quickness, of_pulses, of_step
 from sbs_sim.analysis.step_response import (
     FirstOrder,
     first_order,
@@ -30,7 +32,7 @@ from sbs_sim.analysis.step_response import (
 )
 from sbs_sim.analysis.sweep import SweepPoint, sweep
 from sbs_sim.content import ByContent
-from sbs_sim.errors import LinearizationError
+from sbs_sim.errors import LinearizationError, SbsError
 from sbs_sim.flight.two_blades import has_two_blades
 from sbs_sim.model import state as S
 
@@ -39,7 +41,14 @@ Array = NDArray[np.float64]
 REPORT_SPEEDS = (0.0, 0.25, 0.5, 0.75, 1.0)  # by default, of the fastest
 FASTEST = 20.0 * math.sqrt(16.36 / 2.3)  # m/s at full size: 20 m/s of the side-by-side helicopter
 ATTITUDES = {"pitch": "theta", "roll": "phi", "yaw": "psi"}
+RATES = {"pitch": "q", "roll": "p", "yaw": "r"}
 HEAVE_TIME, COUPLING_TIME, PEAK_TIME, NO_PEAK_TIME = 5.0, 4.0, 3.0, 1.0  # s at full size
+QUICK_TIME = 6.0  # s at full size, in which quickness is looked at
+FASTEST_POLE = 20.0  # rad/s at full size, of a loop, that is listed
+REJECTED = 0.02, 20.0  # rad/s at full size, of disturbances
+ANGLES = 26  # at which quickness is compared
+STILL = 1e-6  # rad/s, of a pole: position and heading that nothing holds
+OWN = 0.2  # share of body and path in such a pole
 LATE = 0.1  # s at full size, of a phase delay
 NOTHING = 1e-9  # of an attitude or rate by a control, over that on its own axis
 
@@ -96,6 +105,10 @@ class QualityPoint(ByContent):
         Fits of the climb rate for each scale.
     judged : tuple of tuple of Quality
         For each scale.
+    quickness : mapping of str to Quickness
+        By axis.
+    loop : LinearLoop or None
+        With the control law; None without one.
     """
 
     airspeed: float
@@ -104,6 +117,13 @@ class QualityPoint(ByContent):
     bandwidths: dict[str, Bandwidth]
     heave: tuple[FirstOrder | None, ...]
     judged: tuple[tuple[Quality, ...], ...]
+    quickness: dict[str, Quickness] = field(default_factory=dict)
+    loop: LinearLoop | None = None
+
+    @property
+    def seen(self) -> LinearModel | LinearLoop | None:
+        """What is judged: the loop, or the model without one."""
+        return self.loop or self.model
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +137,9 @@ class Qualities(ByContent):
         Of sensors, computers and actuators beside the model [s].
     scales : tuple of Scale
     points : tuple of QualityPoint
+    actuator : Actuator, optional
+    law : str
+        What flies; empty for the controls alone.
     """
 
     aircraft: str
@@ -124,6 +147,12 @@ class Qualities(ByContent):
     delay: float
     scales: tuple[Scale, ...]
     points: tuple[QualityPoint, ...]
+    actuator: Actuator | None = None
+    law: str = ""
+
+    def lag(self, point: QualityPoint) -> tuple[float, Actuator | None]:
+        """Delay and actuators before what is judged; a loop has them in it."""
+        return (self.delay, self.actuator) if point.loop is None else (0.0, None)
 
     def rows(self, scale: int = 0) -> dict[str, tuple[Quality | None, ...]]:
         """Qualities by name, one for each airspeed; None where there is none."""
@@ -139,7 +168,9 @@ class Qualities(ByContent):
         return {
             "aircraft": self.aircraft,
             "parameter_hash": self.parameter_hash,
+            "law": self.law,
             "delay": self.delay,
+            "actuator": None if self.actuator is None else asdict(self.actuator),
             "standard": known.standard,
             "limits": {
                 name: {"paragraph": limit.paragraph, "source": limit.source, "read_from_standard": limit.is_read}
@@ -170,6 +201,9 @@ def qualities(
     delay: float = 0.0,
     scale_length: float | None = None,
     is_rate_command: bool = True,
+    actuator: Actuator | None = None,
+    law: LinearLaw | LawOf | None = None,
+    law_name: str = "a control law",
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Qualities:
@@ -186,6 +220,13 @@ def qualities(
         Length for the 16.36 m of the UH-60A [m]; by default the lateral span, and beside it the rotor radius.
     is_rate_command : bool
         See `sbs_sim.analysis.bandwidth.bandwidth`.
+    actuator : Actuator, optional
+        Lag of the actuators, the same for all controls.
+    law : LinearLaw or callable, optional
+        In the loop, or what gives it for a linear model, such as `sbs_sim.pilot.linear_laws.augmentation_law`. Its
+        commands are then what is judged, and it says which of them are answered by a rate.
+    law_name : str
+        For the report.
     workers : int, optional
         Threads, one for each core by default.
     progress : callable, optional
@@ -215,8 +256,10 @@ def qualities(
     if airspeeds is None:
         airspeeds = default_airspeeds(chosen[0])
     swept = sweep(aircraft, "airspeed", airspeeds, workers=workers, progress=progress)
-    points = tuple(_point(point, chosen, delay, is_rate_command) for point in swept.points)
-    return Qualities(aircraft.name, aircraft.parameter_hash, delay, chosen, points)
+    task = _Task(aircraft, chosen, delay, is_rate_command, actuator, law)
+    points = tuple(task.point(point) for point in swept.points)
+    named = law_name if law is not None else ""
+    return Qualities(aircraft.name, aircraft.parameter_hash, delay, chosen, points, actuator, named)
 
 
 def default_airspeeds(scale: Scale) -> list[float]:
@@ -225,35 +268,73 @@ def default_airspeeds(scale: Scale) -> list[float]:
     return [float(f"{fastest * share:.3g}") for share in REPORT_SPEEDS]
 
 
-def _point(point: SweepPoint, chosen: Sequence[Scale], delay: float, is_rate_command: bool) -> QualityPoint:
-    model = point.model
-    if model is None:
-        return QualityPoint(point.value, None, point.error, {}, (None,) * len(chosen), ((),) * len(chosen))
-    bandwidths = attitude_bandwidths(model, delay, is_rate_command)
-    judged, heaves = [], []
-    for scale in chosen:
-        view = _View(model, limits(), scale, delay)
-        heave = view.heave()
-        heaves.append(heave)
-        found = [*view.bandwidths(bandwidths), *view.heave_response(heave), *view.coupling(), *view.modes()]
-        judged.append(tuple(found))
-    return QualityPoint(point.value, model, point.error, bandwidths, tuple(heaves), tuple(judged))
+@dataclass(frozen=True, eq=False)
+class _Task(ByContent):
+    """What is judged, and how."""
+
+    aircraft: Aircraft
+    scales: tuple[Scale, ...]
+    delay: float
+    is_rate_command: bool
+    actuator: Actuator | None
+    law: LinearLaw | LawOf | None
+
+    def point(self, point: SweepPoint) -> QualityPoint:
+        """Judge an airspeed."""
+        model = point.model
+        if model is None:
+            return self._empty(point.value, point.error)
+        loop: LinearLoop | None = None
+        if self.law is not None:
+            try:
+                own = self.law if isinstance(self.law, LinearLaw) else self.law(model)
+                loop = linear_loop(model, own, self.delay, self.actuator)
+            except SbsError as error:
+                return self._empty(point.value, str(error))
+        lag = (self.delay, self.actuator) if loop is None else (0.0, None)
+        seen = model if loop is None else loop
+        bandwidths = attitude_bandwidths(seen, lag[0], self.is_rate_command, lag[1])
+        judged, heaves, quick = [], [], {}
+        for scale in reversed(self.scales):
+            view = _View(seen, limits(), scale, lag, self._rooms(model), self.is_rate_command)
+            heave, quick = view.heave(), view.quickness()
+            heaves.append(heave)
+            found = [*view.bandwidths(bandwidths), *view.quick(quick), *view.rejections(), *view.heave_response(heave)]
+            judged.append((*found, *view.coupling(), *view.modes()))
+        return QualityPoint(
+            point.value, model, point.error, bandwidths, tuple(heaves[::-1]), tuple(judged[::-1]), quick, loop
+        )
+
+    def _empty(self, value: float, error: str | None) -> QualityPoint:
+        count = len(self.scales)
+        return QualityPoint(value, None, error, {}, (None,) * count, ((),) * count)
+
+    def _rooms(self, model: LinearModel) -> dict[str, float]:
+        """How far each control is from the nearer end of its range."""
+        return {
+            control.name: max(0.0, min(control.range[1] - value, value - control.range[0]))
+            for control, value in zip(self.aircraft.controls, model.trim.controls.tolist(), strict=True)
+        }
 
 
-def control_of(model: LinearModel, axis: str) -> str | None:
+def control_of(model: LinearModel | LinearLoop, axis: str) -> str | None:
     """First control that a pilot moves for an axis; None without one."""
     return next((name for name, own in zip(model.control_names, model.control_axes, strict=True) if own == axis), None)
 
 
-def attitude_transfer(model: LinearModel, axis: str, delay: float = 0.0) -> Transfer | None:
+def attitude_transfer(
+    model: LinearModel | LinearLoop, axis: str, delay: float = 0.0, actuator: Actuator | None = None
+) -> Transfer | None:
     """Transfer function from the control of an axis to its attitude: theta, phi, or the heading; None without one."""
     control = control_of(model, axis)
     if control is None:
         return None
+    if isinstance(model, LinearLoop):
+        return model.transfer(control, "heading" if axis == "yaw" else ATTITUDES[axis])
     if axis != "yaw":
-        return Transfer.of(model, control, ATTITUDES[axis], delay)
+        return Transfer.of(model, control, ATTITUDES[axis], delay, actuator)
     found = _heading(model, Transfer.of(model, control, "q", delay), Transfer.of(model, control, "r", delay))
-    return found if np.abs(found.b).any() else None
+    return replace(found, actuator=actuator) if np.abs(found.b).any() else None
 
 
 def _heading(model: LinearModel, pitching: Transfer, yawing: Transfer) -> Transfer:
@@ -269,15 +350,18 @@ def _heading(model: LinearModel, pitching: Transfer, yawing: Transfer) -> Transf
     return Transfer(a, np.append(yawing.b, 0.0), np.eye(size + 1)[size], 0.0, yawing.delay, settled)
 
 
-def attitude_bandwidths(model: LinearModel, delay: float = 0.0, is_rate_command: bool = True) -> dict[str, Bandwidth]:
+def attitude_bandwidths(
+    model: LinearModel | LinearLoop, delay: float = 0.0, is_rate_command: bool = True, actuator: Actuator | None = None
+) -> dict[str, Bandwidth]:
     """Bandwidths of pitch, roll and heading, of the axes that have a control which moves them."""
     found = {}
     for axis, output in ATTITUDES.items():
-        transfer = attitude_transfer(model, axis, delay)
+        transfer = attitude_transfer(model, axis, delay, actuator)
         if transfer is None:
             continue
         try:
-            found[axis] = bandwidth_of(transfer, control_of(model, axis) or "", output, is_rate_command)
+            is_rate = axis in model.rate_axes if isinstance(model, LinearLoop) else is_rate_command
+            found[axis] = bandwidth_of(transfer, control_of(model, axis) or "", output, is_rate)
         except LinearizationError:  # the control does not move it
             continue
     return found
@@ -286,8 +370,17 @@ def attitude_bandwidths(model: LinearModel, delay: float = 0.0, is_rate_command:
 class _View:
     """A linear model seen at a scale."""
 
-    def __init__(self, model: LinearModel, known: Limits, scale: Scale, delay: float) -> None:
-        self.model, self.known, self.scale, self.delay = model, known, scale, delay
+    def __init__(
+        self,
+        model: LinearModel | LinearLoop,
+        known: Limits,
+        scale: Scale,
+        lag: tuple[float, Actuator | None],
+        rooms: Mapping[str, float],
+        is_rate_command: bool,
+    ) -> None:
+        self.model, self.known, self.scale, self.lag, self.rooms = model, known, scale, lag, rooms
+        self.is_rate_command = is_rate_command
         self.flight = known.flight(model.trim.condition.airspeed, scale)
 
     def judged(self, name: str, title: str, unit: str, value: float, power: int, remark: str = "") -> Quality:
@@ -314,6 +407,92 @@ class _View:
     def _unjudged(self, name: str, title: str, unit: str, power: int, remark: str) -> Quality:
         return Quality(name, title, unit, math.nan, 0, "", power, remark)
 
+    def quickness(self) -> dict[str, Quickness]:
+        """Of the axes that have a control which moves them."""
+        found = {}
+        duration = QUICK_TIME / self.scale.speed_up
+        for axis in ATTITUDES:
+            control = control_of(self.model, axis)
+            if control is None:
+                continue
+            turned, turning, room = self._turned(axis, control, duration)
+            if np.abs(turned).max() <= NOTHING * duration:
+                continue
+            is_rate = self.is_rate_command
+            if isinstance(self.model, LinearLoop):
+                is_rate = axis in self.model.rate_axes
+            found[axis] = of_pulses(turned, turning, room) if is_rate else of_step(turned, turning, room)
+        return found
+
+    def _turned(self, axis: str, control: str, duration: float) -> tuple[Array, Array, float]:
+        """Attitude and its rate after a unit step, and how far the step may go."""
+        outputs = [*ATTITUDES.values(), *RATES.values()]
+        own = ["theta", "phi", "q", "p", "r"]
+        steps = step_response(
+            self.model, control, np.array([output_row(self.model, name) for name in own]), duration, *self.lag
+        )
+        values = dict(zip(own, steps, strict=True))
+        room = self.rooms.get(control, math.inf)
+        if isinstance(self.model, LinearLoop):
+            moved = [name for name in self.rooms if name in self.model.output_names]
+            rows = np.array([output_row(self.model, name) for name in moved])
+            most = np.abs(step_response(self.model, control, rows, duration)).max(axis=1)
+            room = min((self.rooms[name] / value for name, value in zip(moved, most, strict=True) if value > 0.0))
+        if axis != "yaw":
+            return values[outputs[0] if axis == "pitch" else outputs[1]], values[RATES[axis]], room
+        roll, pitch = self.model.trim.roll, self.model.trim.pitch
+        rate = (math.sin(roll) * values["q"] + math.cos(roll) * values["r"]) / math.cos(pitch)
+        step = duration / (len(rate) - 1)
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * step * (rate[1:] + rate[:-1]))])
+        return turned, rate, room
+
+    def quick(self, found: Mapping[str, Quickness]) -> list[Quality]:
+        """Quickness of the smallest change with a boundary; the level is the worst of all changes that are reached."""
+        rows = []
+        for axis in ATTITUDES:
+            name, title = f"{axis}_quickness", f"{axis} quickness"
+            limit = self.known.find(name, self.flight)
+            if axis not in found:
+                rows.append(self._unjudged(name, title, "1/s", 1, "no control moves it"))
+                continue
+            own = found[axis]
+            smallest, largest = limit.angles if limit is not None else (10.0, 10.0)
+            value, reach = own.at(math.radians(smallest)), math.degrees(own.reach)
+            remark = f"of a change of {smallest:g} deg; {reach:.0f} deg are reached within the range of the control"
+            if not len(own.values):
+                remark = "an attitude that a pulse leaves is not steady"
+            level = 0
+            if limit is not None:
+                angles = np.linspace(smallest, max(smallest, min(largest, reach)), ANGLES)
+                full = [own.at(math.radians(angle)) / self.scale.speed_up for angle in angles]
+                level = max(limit.level_at(angle, one) for angle, one in zip(angles.tolist(), full, strict=True))
+            key = "" if limit is None else limit.name
+            rows.append(Quality(name, title, "1/s", value, level, key, 1, remark))
+        return rows
+
+    def rejections(self) -> list[Quality]:
+        """Disturbance rejection bandwidth and peak of the attitudes that a law feeds back; none without one."""
+        if not isinstance(self.model, LinearLoop):
+            return []
+        rows = []
+        for axis, attitude in ATTITUDES.items():
+            measured = "heading" if axis == "yaw" else attitude
+            names = [f"{axis}_rejection_{what}" for what in ("bandwidth", "peak")]
+            titles = [name.replace("_", " ") for name in names]
+            if measured not in self.model.measured:
+                remark = "the attitude is not fed back"
+                rows += [self._unjudged(names[0], titles[0], "rad/s", 1, remark)]
+                rows += [self._unjudged(names[1], titles[1], "dB", 0, remark)]
+                continue
+            low, high = (frequency * self.scale.speed_up for frequency in REJECTED)
+            found = self.model.rejection(measured, (low, high))
+            where = f"at {found.peak_frequency:.3g} rad/s"
+            if not self.model.is_stable:
+                where += f"; the loop is not stable, it doubles in {math.log(2.0) / self.model.growth:.3g} s"
+            rows.append(self.judged(names[0], titles[0], "rad/s", found.bandwidth, 1, found.remark))
+            rows.append(self.judged(names[1], titles[1], "dB", found.peak, 0, where))
+        return rows
+
     def heave(self) -> FirstOrder | None:
         """Fit of the climb rate after a step of collective; None without one."""
         collective = control_of(self.model, "heave")
@@ -321,7 +500,7 @@ class _View:
             return None
         duration = HEAVE_TIME / self.scale.speed_up
         row = output_row(self.model, "climb_rate")[np.newaxis]
-        return first_order(step_response(self.model, collective, row, duration, self.delay)[0], duration)
+        return first_order(step_response(self.model, collective, row, duration, *self.lag)[0], duration)
 
     def heave_response(self, fit: FirstOrder | None) -> list[Quality]:
         """Time constant and delay."""
@@ -349,7 +528,7 @@ class _View:
         if control is None:
             return self._unjudged(name, title, "1", 0, f"no control of {axis}")
         rows = np.array([output_row(self.model, output) for output in outputs])
-        on, off = step_response(self.model, control, rows, duration, self.delay)
+        on, off = step_response(self.model, control, rows, duration, *self.lag)
         return self.judged(name, title, "1", _cleaned(off_axis_ratio(off, on)), 0)
 
     def _yaw_from_collective(self) -> Quality:
@@ -358,7 +537,7 @@ class _View:
         if collective is None:
             return self._unjudged(name, title, unit, 2, "no control of heave")
         rows = np.array([output_row(self.model, "r"), output_row(self.model, "climb_rate")])
-        yaw, climb = step_response(self.model, collective, rows, duration, self.delay)
+        yaw, climb = step_response(self.model, collective, rows, duration, *self.lag)
         peak = first_peak(yaw, duration, NO_PEAK_TIME / self.scale.speed_up)
         ratio = abs(math.degrees(peak) / climb[-1]) if climb[-1] != 0.0 else math.nan
         return self.judged(name, title, unit, _cleaned(ratio), 2)
@@ -366,6 +545,10 @@ class _View:
     def modes(self) -> list[Quality]:
         """Frequency, damping and time to half or double of the modes of the body."""
         rows = []
+        if isinstance(self.model, LinearLoop):
+            for mode in loop_modes(self.model, FASTEST_POLE * self.scale.speed_up):
+                rows += self._mode(mode)
+            return rows
         for mode in self.model.modes:
             if mode.family == "body":
                 rows += self._mode(mode)
@@ -395,7 +578,21 @@ class _View:
         return Quality(title, title, unit, value, 0, "", power)
 
 
-def _is_longitudinal(mode: Mode, model: LinearModel) -> bool:
+def loop_modes(loop: LinearLoop, fastest: float) -> list[Mode]:
+    """Poles of a loop up to a frequency [rad/s] in which body or path take part, slowest first, by their number."""
+    values, vectors = np.linalg.eig(loop.a)
+    shares = np.abs(vectors * np.linalg.inv(vectors).T)
+    shares /= shares.sum(axis=0)
+    own = np.array([name in (*S.LINEAR_BODY_NAMES, *PATH) for name in loop.state_names])
+    order = [i for i in np.argsort(np.abs(values)) if values[i].imag >= 0.0]
+    kept = [i for i in order if STILL < abs(values[i]) <= fastest and shares[own, i].sum() >= OWN]
+    return [
+        Mode(f"loop {number}", complex(values[i]), vectors[:, i].astype(complex), shares[:, i], "body")
+        for number, i in enumerate(kept, 1)
+    ]
+
+
+def _is_longitudinal(mode: Mode, model: LinearModel | LinearLoop) -> bool:
     """Whether more of a mode is in u, w, q and theta than in the other states of the body."""
     shares = dict(zip(model.state_names, mode.participation.tolist(), strict=True))
     own = sum(shares.get(name, 0.0) for name in LONGITUDINAL)

@@ -7,7 +7,7 @@ from html import escape
 from sbs_sim.analysis.html import document, plain_table, text_of
 from sbs_sim.analysis.plots import Drawing
 from sbs_sim.analysis.qualities import Qualities, Quality
-from sbs_sim.analysis.quality_limits import OSCILLATION, RANGE, Limit, Scale, limits
+from sbs_sim.analysis.quality_limits import CURVE, OSCILLATION, RANGE, Limit, Scale, limits
 
 MARK = "*"  # of a boundary that was not read in the standard
 SMALLEST = 0.001  # that is written
@@ -38,6 +38,27 @@ def table(report: Qualities, scale: int) -> list[list[str]]:
     return rows
 
 
+def both_headings(report: Qualities) -> list[str]:
+    """Of the table of two reports beside each other."""
+    return ["", "unit", "level 1", "level 2", "flown", *headings(report)[4:]]
+
+
+def both_table(bare: Qualities, controlled: Qualities, scale: int) -> list[list[str]]:
+    """Rows under `both_headings`: each quality of the bare aircraft, and below it of the controlled one."""
+    known = {who: report.rows(scale) for who, report in (("bare", bare), ("controlled", controlled))}
+    written = {
+        who: dict(zip(known[who], table(report, scale), strict=True))
+        for who, report in (("bare", bare), ("controlled", controlled))
+    }
+    rows = []
+    for name in dict.fromkeys([*known["bare"], *known["controlled"]]):
+        for who, own in written.items():
+            if name in own:
+                title, unit, first, second, *cells = own[name]
+                rows.append([title, unit, first, second, who, *cells])
+    return rows
+
+
 def _cell(quality: Quality | None) -> str:
     if quality is None:
         return ""
@@ -60,6 +81,11 @@ def _limits(row: Sequence[Quality | None], scale: Scale) -> list[str]:
 def _limit(limit: Limit, level: int, power: int, scale: Scale) -> str:
     """What a level asks for; of modes the name of the boundary, which has several parts."""
     factor = scale.speed_up**power
+    if level >= len(limit.levels):
+        return "not limited"
+    if limit.kind == CURVE:
+        ends = [f"{number(limit.least_at(level + 1, angle) * factor)} at {angle:g}" for angle in limit.angles]
+        return f">= {' to '.join(ends)} deg"
     if limit.kind == RANGE:
         asked = [
             f"{'>=' if name == 'least' else '<='} {number(value * factor)}"
@@ -92,11 +118,11 @@ def boundaries(report: Qualities) -> list[str]:
     for name in used:
         if name:
             limit = limits().by_name[name]
+            origin = "from memory of" if limit.is_remembered else "after"
             words = [limit.paragraph, *([_oscillation(limit)] if limit.kind == OSCILLATION else [])]
-            read = (
-                "read in the standard" if limit.is_read else f"not read in the standard; from memory of {limit.source}"
-            )
-            lines.append("; ".join([*words, read, *([limit.remark] if limit.remark else [])]))
+            read = "read in the standard" if limit.is_read else f"not read in the standard; {origin} {limit.source}"
+            agreed = [f"agrees with {limit.checked}"] if limit.checked else []
+            lines.append("; ".join([*words, read, *agreed, *([limit.remark] if limit.remark else [])]))
     return lines
 
 
@@ -116,8 +142,13 @@ def _oscillation(limit: Limit) -> str:
 def statement(report: Qualities) -> str:
     """What was judged, and after what."""
     late = f", behind {report.delay:g} s of delay" if report.delay else ""
+    if report.actuator is not None:
+        late += (
+            f", by actuators of {report.actuator.frequency:g} rad/s with a damping ratio of {report.actuator.damping:g}"
+        )
+    flown = "its controls without a controller" if not report.law else f"{report.law}"
     return (
-        f"Flying qualities of {report.aircraft}, flown by its controls without a controller{late}. Levels in brackets"
+        f"Flying qualities of {report.aircraft}, flown by {flown}{late}. Levels in brackets"
         f" after {limits().standard}; boundaries with {MARK} were not read in the standard itself."
     )
 

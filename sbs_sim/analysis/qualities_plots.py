@@ -3,16 +3,25 @@
 import math
 from collections.abc import Callable
 from functools import partial
-from html import escape
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sbs_sim.analysis.page import PAGE, inline_svg, make_folder
+from sbs_sim.analysis.linear_loop import LinearLoop
+from sbs_sim.analysis.linear_model import LinearModel
+from sbs_sim.analysis.page import PAGE, inline_drawing, make_folder, save_drawings
 from sbs_sim.analysis.plots import GRID, INK, Drawing
-from sbs_sim.analysis.qualities import ATTITUDES, HEAVE_TIME, Qualities, attitude_transfer, control_of
+from sbs_sim.analysis.qualities import (
+    ATTITUDES,
+    FASTEST_POLE,
+    HEAVE_TIME,
+    Qualities,
+    attitude_transfer,
+    control_of,
+    loop_modes,
+)
 from sbs_sim.analysis.qualities_format import page_text
 from sbs_sim.analysis.quality_limits import FORWARD, LOW_SPEED, Limit, Scale, limits
 from sbs_sim.analysis.step_response import output_row, step_response, times
@@ -22,6 +31,7 @@ from sbs_sim.output.plot_style import COLOURS, DASHES
 
 WIDE = 10.0  # inches
 LEVEL_DASHES = ("-", "--", ":")
+REJECTED = -3.0  # dB
 BODE = (0.1, 100.0)  # rad/s at full size
 JSON = "qualities.json"
 
@@ -37,17 +47,8 @@ def save_qualities(
         Folder or files cannot be written.
     """
     folder = make_folder(folder)
-    written, shown = [], []
-    every = drawings(report)
-    for done, drawing in enumerate(every, 1):
-        encoded = drawing.encoded()
-        for kind, content in encoded.items():
-            written.append(folder / f"{drawing.name}.{kind}")
-            write(written[-1], content)
-        label = escape(drawing.caption, quote=True)
-        shown.append((drawing, inline_svg(encoded["svg"].decode(), drawing.name, label)))
-        if progress is not None:
-            progress(done, len(every))
+    written, drawn = save_drawings(drawings(report), folder, progress)
+    shown = [(drawing, inline_drawing(drawing, svg)) for drawing, svg in drawn]
     written += [folder / JSON, folder / PAGE]
     write(written[-2], to_json(report.to_dict()))
     write(written[-1], page_text(report, shown))
@@ -63,7 +64,10 @@ def drawings(report: Qualities) -> list[Drawing]:
         ("Attitude about the other axis over that about the axis of the control", coupling_figure),
         ("Bode plots of the attitudes by their controls", bode_figure),
         ("Nichols plots of the attitudes by their controls, with the phase of the bandwidth", nichols_figure),
+        ("Quickness of moderate changes of the attitudes with the boundaries at each scale", quickness_figure),
     ]
+    if any(point.loop is not None for point in report.points):
+        captions.append(("What is measured over a disturbance that is added to it", rejection_figure))
     return [Drawing(number, caption, True, partial(draw, report)) for number, (caption, draw) in enumerate(captions, 1)]
 
 
@@ -128,15 +132,68 @@ def _legend(axes: Axes) -> None:
         axes.legend(once.values(), once.keys(), fontsize=7)
 
 
+def quickness_figure(report: Qualities) -> Figure:
+    """Quickness over the change of each attitude."""
+    figure = _figure(WIDE, 3.6)
+    for axes, axis in zip(figure.subplots(1, 3), ATTITUDES, strict=True):
+        widest = 0.0
+        for i, scale in enumerate(report.scales):
+            flights = dict.fromkeys(limits().flight(point.airspeed, scale) for point in report.points)
+            limit = next((found for flight in flights if (found := limits().find(f"{axis}_quickness", flight))), None)
+            for level, points in enumerate(() if limit is None else limit.levels, 1):
+                angles, values = np.array(points).T
+                label, widest = f"level {level}, {scale.name}", max(widest, angles[-1])
+                axes.plot(
+                    angles,
+                    values * scale.speed_up,
+                    color=COLOURS[3 + i],
+                    linestyle=LEVEL_DASHES[level - 1],
+                    label=label,
+                )
+        for i, point in enumerate(report.points):
+            own = point.quickness.get(axis)
+            if own is not None and len(own.values):
+                label = f"{point.airspeed:g} m/s"
+                axes.plot(np.degrees(own.changes), own.values, color=COLOURS[i % 3], marker=".", label=label)
+        axes.set_title(axis)
+        axes.set_xlabel("smallest change [deg]")
+        axes.set_ylabel("quickness [1/s]")
+        axes.set_xlim(0.0, 1.1 * widest or None)
+        axes.set_ylim(bottom=0.0)
+        _legend(axes)
+        _grid(axes)
+    return figure
+
+
+def rejection_figure(report: Qualities) -> Figure:
+    """Gain from a disturbance to the disturbed measurement, an axes for each attitude."""
+    figure = _figure(WIDE, 3.6)
+    low, high = (frequency * report.scales[0].speed_up for frequency in BODE)
+    frequencies = np.geomspace(0.1 * low, high, 240)
+    for axes, (axis, attitude) in zip(figure.subplots(1, 3), ATTITUDES.items(), strict=True):
+        measured = "heading" if axis == "yaw" else attitude
+        for i, point in enumerate(report.points):
+            if point.loop is not None and measured in point.loop.measured:
+                gain = 20.0 * np.log10(np.abs(point.loop.sensitivity(measured, frequencies)))
+                axes.semilogx(frequencies, gain, color=COLOURS[i % len(COLOURS)], label=f"{point.airspeed:g} m/s")
+        axes.axhline(REJECTED, color=INK, linewidth=0.8, linestyle=":")
+        axes.set_title(axis)
+        axes.set_xlabel("frequency [rad/s]")
+        axes.set_ylabel("gain [dB]")
+        _legend(axes)
+        _grid(axes)
+    return figure
+
+
 def modes_figure(report: Qualities) -> Figure:
     """Poles of the body at full size, an axes for each scale."""
     figure = _figure(WIDE, 4.5)
     panels = np.atleast_1d(figure.subplots(1, len(report.scales)))
     for axes, scale in zip(panels, report.scales, strict=True):
         for i, point in enumerate(report.points):
-            if point.model is None:
+            if point.seen is None:
                 continue
-            poles = np.array([mode.pole for mode in point.model.modes if mode.family == "body"]) / scale.speed_up
+            poles = np.array(_poles(point.seen, scale)) / scale.speed_up
             colour = COLOURS[i % len(COLOURS)]
             axes.plot(poles.real, poles.imag, "o", color=colour, label=f"{point.airspeed:g} m/s", markersize=4)
         top = max(1.5, 1.05 * max(axes.get_ylim()[1], 0.0))
@@ -179,11 +236,11 @@ def heave_figure(report: Qualities) -> Figure:
     at = times(duration)
     for i, point in enumerate(report.points):
         fit = point.heave[0]
-        collective = None if point.model is None else control_of(point.model, "heave")
-        if point.model is None or fit is None or collective is None:
+        collective = None if point.seen is None else control_of(point.seen, "heave")
+        if point.seen is None or fit is None or collective is None:
             continue
-        row = output_row(point.model, "climb_rate")[np.newaxis]
-        found = step_response(point.model, collective, row, duration, report.delay)[0]
+        row = output_row(point.seen, "climb_rate")[np.newaxis]
+        found = step_response(point.seen, collective, row, duration, *report.lag(point))[0]
         colour = COLOURS[i % len(COLOURS)]
         axes.plot(at, found, color=colour, label=f"{point.airspeed:g} m/s")
         axes.plot(at, fit.at(at), color=colour, linestyle=":")
@@ -275,11 +332,18 @@ def _responses(report: Qualities, axis: str) -> list[tuple[float, np.ndarray, np
     low, high = (frequency * report.scales[0].speed_up for frequency in BODE)
     frequencies = np.geomspace(low, high, 240)
     for point in report.points:
-        if point.model is None or axis not in point.bandwidths:
+        if point.seen is None or axis not in point.bandwidths:
             continue
-        transfer = attitude_transfer(point.model, axis, report.delay)
+        transfer = attitude_transfer(point.seen, axis, *report.lag(point))
         if transfer is None:
             continue
         turned = -math.pi if transfer.starts_down else 0.0
         found.append((point.airspeed, frequencies, transfer.at(frequencies), transfer.phase(frequencies) + turned))
     return found
+
+
+def _poles(seen: LinearModel | LinearLoop, scale: Scale) -> list[complex]:
+    """Of the body, or of a loop."""
+    if isinstance(seen, LinearLoop):
+        return [mode.pole for mode in loop_modes(seen, FASTEST_POLE * scale.speed_up)]
+    return [mode.pole for mode in seen.modes if mode.family == "body"]

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sbs_sim import checks
 from sbs_sim.config_file import config_folder, read_yaml
 from sbs_sim.errors import LinearizationError
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 FILE = "flying_qualities.yaml"
 LENGTHS = (0.01, 1000.0)  # m
 LOW_SPEED, FORWARD, ANY = "low_speed", "forward", "any"
-RANGE, OSCILLATION, DIVERGENCE = "range", "oscillation", "divergence"
+RANGE, OSCILLATION, DIVERGENCE, CURVE = "range", "oscillation", "divergence", "curve"
 ALIKE = 1e-3  # of two scales
 
 
@@ -34,14 +36,18 @@ class Limit:
     Attributes
     ----------
     name, kind, paragraph, flight, remark : str
-        `kind` is "range", "oscillation" or "divergence"; `flight` is "low_speed", "forward" or "any".
+        `kind` is "range", "oscillation", "divergence" or "curve"; `flight` is "low_speed", "forward" or "any".
     levels : tuple
         What each level asks for: a mapping with "least" or "most" (range), a tuple of bands (oscillation),
-        or the shortest time to double [s] (divergence).
+        the shortest time to double [s] (divergence), or pairs of an angle [deg] and the least value there (curve).
     source : str
         Where the boundary is reported.
     is_read : bool
         Whether it was read in the standard itself.
+    checked : str
+        What public text or data it agrees with; empty for none.
+    is_remembered : bool
+        Whether it was written down from memory of its source.
     """
 
     name: str
@@ -52,6 +58,26 @@ class Limit:
     source: str
     is_read: bool
     remark: str
+    checked: str = ""
+    is_remembered: bool = True
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        """Smallest and largest angle of a curve [deg]."""
+        return self.levels[0][0][0], self.levels[0][-1][0]
+
+    def least_at(self, level: int, angle: float) -> float:
+        """What a level asks for at an angle of a curve [deg]."""
+        points = self.levels[level - 1]
+        angles, values = zip(*points, strict=True)
+        return float(np.interp(angle, angles, values))
+
+    def level_at(self, angle: float, value: float) -> int:
+        """Level of a value of full size at an angle [deg], 1 to 3; 3 for not a number."""
+        for level in range(1, len(self.levels) + 1):
+            if value >= self.least_at(level, angle):
+                return level
+        return len(self.levels) + 1
 
     def level_of(self, value: float) -> int:
         """Level of a value of full size, 1 to 3; 3 for not a number."""
@@ -149,6 +175,8 @@ def limits() -> Limits:
             " ".join(read["sources"][entry["source"]].split()),
             entry["read_from_standard"],
             " ".join(entry["remark"].split()),
+            " ".join(read["sources"][entry["checked"]].split()) if "checked" in entry else "",
+            entry.get("remembered", True),
         )
         for name, entry in read["limits"].items()
     }

@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from sbs_sim.content import ByContent
 
 if TYPE_CHECKING:
+    from sbs_sim.analysis.frequency_response import Actuator
+    from sbs_sim.analysis.linear_loop import LinearLoop
     from sbs_sim.analysis.linear_model import LinearModel
+    from sbs_sim.analysis.reduced import ReducedModel
 
 Array = NDArray[np.float64]
 
@@ -53,12 +56,19 @@ class FirstOrder(ByContent):
         return self.gain * _rise(times, self.time_constant, self.delay)
 
 
-def step_response(model: LinearModel, input_name: str, outputs: Array, duration: float, delay: float = 0.0) -> Array:
+def step_response(
+    model: LinearModel | LinearLoop | ReducedModel,
+    input_name: str,
+    outputs: Array,
+    duration: float,
+    delay: float = 0.0,
+    actuator: Actuator | None = None,
+) -> Array:
     """Outputs after a unit step of a control at time zero, all else held.
 
     Parameters
     ----------
-    model : LinearModel
+    model : LinearModel, LinearLoop or ReducedModel
     input_name : str
         Of a control.
     outputs : ndarray, shape (o, n + m)
@@ -67,6 +77,8 @@ def step_response(model: LinearModel, input_name: str, outputs: Array, duration:
         [s]
     delay : float
         By which everything is late [s].
+    actuator : Actuator, optional
+        Between the control and the model.
 
     Returns
     -------
@@ -76,19 +88,22 @@ def step_response(model: LinearModel, input_name: str, outputs: Array, duration:
     from scipy.linalg import expm
 
     size, column = len(model.a), model.control_names.index(input_name)
-    extended = np.zeros((size + 1, size + 1))
+    lag = 0 if actuator is None else 2
+    extended = np.zeros((size + lag + 1, size + lag + 1))  # the last is the step, that at `size` moves the model
     extended[:size, :size], extended[:size, size] = model.a, model.b[:, column]
+    if actuator is not None:
+        extended[size : size + 2, size:] = actuator.matrix
     step = duration / SAMPLES
     forward = expm(extended * step)
-    states = np.zeros((SAMPLES + 1, size + 1))
-    states[:, size] = 1.0
+    states = np.zeros((SAMPLES + 1, size + lag + 1))
+    states[:, -1] = 1.0
     first = math.ceil(delay / step - 1e-9)
     if first > SAMPLES:
         return np.zeros((len(outputs), SAMPLES + 1))
-    states[first] = expm(extended * (first * step - delay))[:, size]
+    states[first] = expm(extended * (first * step - delay))[:, -1]
     for i in range(first, SAMPLES):
         states[i + 1] = forward @ states[i]
-    found = np.column_stack([outputs[:, :size], outputs[:, size + column]]) @ states.T
+    found = np.column_stack([outputs[:, :size], outputs[:, size + column]]) @ states[:, : size + 1].T
     found[:, :first] = 0.0
     return np.asarray(found)
 
@@ -98,7 +113,7 @@ def times(duration: float) -> Array:
     return np.linspace(0.0, duration, SAMPLES + 1)
 
 
-def output_row(model: LinearModel, name: str) -> Array:
+def output_row(model: LinearModel | LinearLoop | ReducedModel, name: str) -> Array:
     """Row of an output by states and controls, shape (n + m,)."""
     i = model.output_names.index(name)
     return np.concatenate([model.c[i], model.d[i]])

@@ -59,7 +59,7 @@ class SweepPoint:
     trim : TrimPoint or None
         None where there is no trim.
     model : LinearModel or None
-        None where there is no trim, and where linear models were not asked for.
+        None where there is no trim, where linear models were not asked for, and of rotors with two blades.
     error : str or None
         Why something is missing, in one line; "cancelled" for what was not started.
     """
@@ -140,7 +140,7 @@ class Sweep:
         part = S.part_of(name)
         if part.family == "drive":
             return S.DRIVE_UNITS[name.partition("(")[0]]
-        return "1" if part.family == "inflow" else "rad/s" if part.is_rate else "rad"
+        return "1" if part.family in ("inflow", "wake") else "rad/s" if part.is_rate else "rad"
 
     def __getitem__(self, name: str) -> Array:
         """Values of a name along the sweep, NaN where there is no trim.
@@ -307,15 +307,27 @@ def sweep_flights(
     checks.instance("aircraft", aircraft, Aircraft, SweepError)
     if guess is not None:
         checked_guess(aircraft, guess)
-    numbers = _checked_values(values)
+    numbers = checked_values(values)
     linear = checks.flag("linear", linear, SweepError)
-    _check_parameter(aircraft, parameter)
-    if parameter in CONDITIONS and getattr(condition, parameter) != 0.0:
-        value = checks.shown(getattr(condition, parameter))
-        raise SweepError(f"{parameter} = {value}: not allowed where {parameter} is swept")
-    execution = execution or Execution()
+    check_parameter(aircraft, parameter, condition)
+    chosen = [{parameter: value} for value in numbers]
+    points = solve_points(aircraft, chosen, condition, fidelity, execution or Execution(), guess=guess, linear=linear)
+    return Sweep(parameter, tuple(points), control_units(aircraft))
+
+
+def solve_points(
+    aircraft: Aircraft,
+    chosen: Sequence[Mapping[str, float]],
+    condition: TrimCondition,
+    fidelity: Fidelity,
+    execution: Execution,
+    *,
+    guess: Guess | None = None,
+    linear: bool,
+) -> list[SweepPoint]:
+    """Points side by side, each with what is chosen there; see `solve_point`."""
     threads, progress = execution.threads(SweepError), execution.progress
-    points = [SweepPoint(value, None, None, CANCELLED) for value in numbers]
+    points = [SweepPoint(next(iter(one.values())), None, None, CANCELLED) for one in chosen]
     done = itertools.count(1)
 
     def keep(i: int, point: SweepPoint) -> None:
@@ -323,13 +335,18 @@ def sweep_flights(
         if progress is not None:
             progress(point, next(done), len(points))
 
-    calls = [(aircraft, parameter, value, condition, fidelity, guess, linear) for value in numbers]
-    compute(_solve, calls, keep, execution, threads)
-    controls = dict(zip(aircraft.control_names, aircraft.control_units, strict=True))
-    return Sweep(parameter, tuple(points), controls)
+    calls = [(aircraft, one, condition, fidelity, guess, linear) for one in chosen]
+    compute(solve_point, calls, keep, execution, threads)
+    return points
 
 
-def _checked_values(values: ArrayLike) -> list[float]:
+def control_units(aircraft: Aircraft) -> dict[str, str]:
+    """Units of the controls by name."""
+    return dict(zip(aircraft.control_names, aircraft.control_units, strict=True))
+
+
+def checked_values(values: ArrayLike) -> list[float]:
+    """Values of a parameter; SweepError where there are none, or one is not finite."""
     numbers = checks.array("values", values, SweepError)
     if numbers.ndim != 1 or numbers.size == 0:
         raise SweepError(f"values have the shape {numbers.shape}: allowed is a list of at least one number")
@@ -339,9 +356,13 @@ def _checked_values(values: ArrayLike) -> list[float]:
     return [float(value) for value in numbers]
 
 
-def _check_parameter(aircraft: Aircraft, parameter: str) -> None:
+def check_parameter(aircraft: Aircraft, parameter: str, condition: TrimCondition) -> None:
+    """Raise SweepError for an unknown parameter, and one of which the condition has a value too."""
     checks.instance("parameter", parameter, str, SweepError)
     if parameter in CONDITIONS:
+        if getattr(condition, parameter) != 0.0:
+            value = checks.shown(getattr(condition, parameter))
+            raise SweepError(f"{parameter} = {value}: not allowed where {parameter} is swept")
         return
     try:
         aircraft.value(parameter)
@@ -349,22 +370,22 @@ def _check_parameter(aircraft: Aircraft, parameter: str) -> None:
         raise SweepError(f"parameter {parameter!r}: allowed are {', '.join(CONDITIONS)} or a path; {error}") from None
 
 
-def _solve(
+def solve_point(
     aircraft: Aircraft,
-    parameter: str,
-    value: float,
+    chosen: Mapping[str, float],
     condition: TrimCondition,
     fidelity: Fidelity,
     guess: Guess | None,
     linear: bool,
 ) -> SweepPoint:
-    """One point, with its error if there is one."""
-    point = None
+    """One point, with its error if there is one; its value is the first one chosen, and all are checked together."""
+    value, point = next(iter(chosen.values())), None
+    flown = {name: number for name, number in chosen.items() if name in CONDITIONS}
+    changes = {name: number for name, number in chosen.items() if name not in CONDITIONS}
     try:
-        if parameter in CONDITIONS:
-            condition = replace(condition, **{parameter: value})
-        else:
-            aircraft = aircraft.with_value(parameter, value)
+        condition = replace(condition, **flown)
+        if changes:
+            aircraft = aircraft.with_values(changes)
         point = solve_trim(aircraft, condition, fidelity, guess=guess)
         has_model = linear and not has_two_blades(aircraft)  # two blades have no constant one
         return SweepPoint(value, point, linearize_trim(aircraft, point) if has_model else None, None)

@@ -38,7 +38,8 @@ Array = NDArray[np.float64]
 Guess = TrimPoint | ArrayLike | tuple[ArrayLike, ArrayLike]
 
 METHODS = ("newton", "two_loop")
-MEAN_ONLY = "this is the mean flight of three lighter blades in place of two"
+TWO_BLADES = "two blades"  # with which a warning begins
+MEAN_ONLY = "this is the mean flight of three lighter blades in place of two, and there is no linear model"
 
 
 def trim(
@@ -163,7 +164,7 @@ def _own(aircraft: Aircraft, point: TrimPoint) -> TrimPoint:
     try:
         common_period(aircraft)
     except LinearizationError as error:
-        return replace(point, warnings=(*point.warnings, *warned, f"two blades: {error}; {MEAN_ONLY}"))
+        return replace(point, warnings=(*point.warnings, *warned, f"{TWO_BLADES}: {error}; {MEAN_ONLY}"))
     point = replace(point, warnings=(*point.warnings, *warned))
     return periodic_rest(aircraft, point) if isinstance(point, StandPoint) else periodic(aircraft, point)
 

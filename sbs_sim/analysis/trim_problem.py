@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.commands import row_problems
 from sbs_sim.aircraft.description import Drive
-from sbs_sim.flight.engine import Engine, points_engine
+from sbs_sim.flight.engine import Engine, inflow_owner, points_engine
 from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 from sbs_sim.flight.validity import slow_rotors, warnings
 from sbs_sim.model import records as R
@@ -99,10 +99,10 @@ class TrimProblem:
             inflow = index[self.layout.inflow(j)][: 3 if self.fidelity.cyclic_inflow else 1]
             places += list(inflow)
             equations += list(inflow)
-            # with interference the inflow of a rotor changes the blades of all
-            has_inflow_alone = self.aircraft.options.interference == "none"
             owners += [j] * (len(places) - len(inflow) - len(owners))
-            owners += [j if has_inflow_alone else len(self.aircraft.rotors)] * len(inflow)
+            owners += [inflow_owner(self.engine.model, j)] * len(inflow)
+            wake = list(index[self.layout.wake(j)])
+            places, equations, owners = places + wake, equations + wake, owners + [j] * len(wake)
         return np.array(places), np.array(equations), np.array(owners)
 
     def _equation_scales(self) -> Array:
@@ -110,7 +110,7 @@ class TrimProblem:
         scales = np.full(self.layout.size, gravity)
         for j, rotor in enumerate(self.aircraft.rotors):
             scales[self.layout.flap_rate(j)] = scales[self.layout.lag_rate(j)] = rotor.speed * rotor.speed
-            scales[self.layout.inflow(j)] = rotor.speed
+            scales[self.layout.inflow(j)] = scales[self.layout.wake(j)] = rotor.speed
         for i, drive in enumerate(self.aircraft.drives):
             own = {S.SPEED: self.aircraft.drive_speed(i) ** 2, S.ENGINE_TORQUE: drive.max_torque / drive.lag}
             own[S.GOVERNOR] = drive.integral_gain

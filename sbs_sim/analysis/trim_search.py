@@ -16,6 +16,7 @@ from sbs_sim.analysis.trim_guess import MomentumTheory
 from sbs_sim.analysis.trim_problem import ATTITUDE_UNKNOWNS, BODY_UNKNOWNS, TrimProblem, largest_torque
 from sbs_sim.errors import TrimError
 from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.flight.two_blades import substitute
 from sbs_sim.model import records as R
 
 Array = NDArray[np.float64]
@@ -301,7 +302,7 @@ class _Search:
         aircraft = self._problem.aircraft
         if not aircraft.drives:
             return []
-        fixed = Aircraft.from_dict({**aircraft.data, "drives": []}, aircraft.folder)
+        fixed = substitute(Aircraft.from_dict({**aircraft.data, "drives": []}, aircraft.folder))
         kept = TrimProblem(fixed, self._problem.fidelity)
         try:
             unknowns, _ = find(kept, self._condition)

@@ -1,6 +1,7 @@
 """Frequency responses and bandwidths of linear models, against closed forms, python-control and flights."""
 
 import math
+from dataclasses import replace
 
 import control
 import numpy as np
@@ -9,7 +10,8 @@ from scipy.optimize import brentq
 
 from sbs_sim import Aircraft, linearize, simulate, trim
 from sbs_sim.analysis.bandwidth import bandwidth_of
-from sbs_sim.analysis.frequency_response import Transfer, frequency_response
+from sbs_sim.analysis.frequency_response import Actuator, Transfer, frequency_response
+from sbs_sim.analysis.step_response import output_row, step_response
 from sbs_sim.errors import LinearizationError
 
 PITCH = ("longitudinal_cyclic", "theta")
@@ -145,6 +147,54 @@ def test_rate_response_has_its_closed_form(damping, delay, sign):
     twice = brentq(lambda w: gain(w) - 10.0**0.3 * gain(crossing), 1e-4, crossing)
     assert found.gain_bandwidth == pytest.approx(twice, rel=1e-9)
     assert found.bandwidth == min(found.phase_bandwidth, found.gain_bandwidth)
+
+
+def test_actuators_are_in_series(model):
+    """Against python-control's product of both systems, in gain, and with a phase that goes on below -180 deg."""
+    lag = Actuator(40.0, 0.6)
+    frequencies = np.geomspace(0.5, 300.0, 60)
+    found = model.frequency_response("lateral_cyclic", "phi", frequencies, 0.01, lag)
+    plain = model.frequency_response("lateral_cyclic", "phi", frequencies, 0.01)
+    theirs = control.tf([1600.0], [1.0, 48.0, 1600.0])(1j * frequencies)
+    np.testing.assert_allclose(found.response, plain.response * theirs, rtol=1e-9)
+    np.testing.assert_allclose(np.exp(1j * found.phase), found.response / np.abs(found.response), atol=1e-9)
+    np.testing.assert_allclose(found.phase - plain.phase, np.unwrap(np.angle(theirs)), atol=1e-9)
+    assert found.to_dict()["actuator"] == {"frequency": 40.0, "damping": 0.6}
+
+
+def test_actuators_take_bandwidth():
+    """The crossing of -180 deg is where the phases of pole, integrator, delay and actuator add up."""
+    lag = Actuator(20.0, 0.8)
+    found = bandwidth_of(replace(rate_response(4.0, 0.02), actuator=lag), "stick", "theta")
+
+    def phase(w):
+        return -math.pi / 2 - math.atan(w / 4.0) - 0.02 * w - math.atan2(1.6 * w / 20.0, 1.0 - (w / 20.0) ** 2)
+
+    assert found.crossing == pytest.approx(brentq(lambda w: phase(w) + math.pi, 0.1, 50.0), rel=1e-9)
+    assert found.phase_bandwidth == pytest.approx(brentq(lambda w: phase(w) + 0.75 * math.pi, 0.1, 50.0), rel=1e-9)
+
+
+def test_steps_through_actuators(sbs):
+    model, lag = linearize(sbs, airspeed=10.0), Actuator(30.0, 0.5)
+    row = output_row(model, "climb_rate")[np.newaxis]
+    ours = step_response(model, "collective", row, 1.0, actuator=lag)[0]
+    column = model.control_names.index("collective")
+    plant = control.ss(model.a, model.b[:, [column]], row[:, : len(model.a)], row[:, [len(model.a) + column]])
+    theirs = control.step_response(plant * control.tf([900.0], [1.0, 30.0, 900.0]), np.linspace(0.0, 1.0, 401)).outputs
+    np.testing.assert_allclose(ours, theirs, atol=1e-6 * np.abs(theirs).max())
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ((0.0, 0.7), "actuator.frequency = 0.0: allowed are 0.0001 to 100000 rad/s"),
+        ((9.0, 0.0), "actuator.damping = 0.0"),
+    ],
+)
+def test_actuators_are_checked(given, text):
+    with pytest.raises(LinearizationError) as caught:
+        Actuator(*given)
+    assert str(caught.value).startswith(text)
 
 
 @pytest.mark.parametrize(("frequency", "damping"), [(2.0, 0.7), (3.0, 0.4)])

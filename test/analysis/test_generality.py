@@ -4,15 +4,18 @@ import functools
 
 import numpy as np
 import pytest
-from aircraft_laws import CONSERVED, MIRROR, balance_errors, mirror_error, mode_faults
-from random_options import ALL_KINDS, equipped_flights
+from aircraft_laws import CONSERVED, MIRROR, balance_errors, inflow_error, mirror_error, mode_faults
+from random_options import ALL_KINDS, NEVER_DRAWN, drawn_keys, equipped_flights, schema_keys
 
 from sbs_sim import linearize, trim
 from sbs_sim.analysis.modes import Mode
 from sbs_sim.errors import TrimError
+from sbs_sim.flight.two_blades import has_two_blades
 
-SEED = 6  # of which ten aircraft have all keys
+SEED = 6  # of which ten aircraft have nearly all keys
 NUMBERS = range(10)
+LACKING = {"body.fuselage.roll.alpha", "controls.*.held", "options.interference = skewed_wake"}
+LACKING |= {"rotors.ring_unsteadiness"}  # without an effect on the derivative
 
 WITHOUT_TRIM = {5: "^no trim: a rotor alone has nothing against its torque"}
 
@@ -24,36 +27,24 @@ def sample(number):
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_mirror_symmetry_momentum_and_energy(number):
-    """The image flies the image; loads and powers account for every change, torque reaction and engines included."""
+    """The image flies the image; loads and powers account for every change, torque reaction and engines included.
+
+    The inflow is that of the plain model.
+    """
     _, aircraft, _ = sample(number)
     assert mirror_error(aircraft, number) < MIRROR
+    assert inflow_error(aircraft, number) < CONSERVED
     errors = balance_errors(aircraft, number)
     assert max(errors.values()) < CONSERVED, errors
 
 
 def test_the_sample_has_every_key():
-    """Otherwise it shows less than it says."""
-    texts = [str(dict(sample(number)[1].data)) for number in NUMBERS]
-    for key in (
-        *("stations", "blade_inertia", "flap_rest_deg", "lag_rest_deg", "lag_damper", "blade_lag_damping", "'wash'"),
-        *("surfaces", "schedule", "polar", "fuselage", "grid", "altitude", "sc1095r8", "held_deg", "drives"),
-        *(
-            "'electric'",
-            "'engine'",
-            "governor",
-            "free_wheel",
-            "stand",
-            "swashplate_offset_deg",
-            "lip_arm",
-            "induced_power_factor",
-            "quarter_chord",
-            "chordwise_cg",
-            "lag_stop",
-        ),
-    ):
-        assert any(key in text for text in texts), key
-    blades = {rotor.blades for number in NUMBERS for rotor in sample(number)[1].rotors}
-    assert blades == set(range(3, 8))
+    """Otherwise it shows less than it says; what it lacks has tests of its own."""
+    known = schema_keys()
+    drawn = set().union(*(drawn_keys(dict(sample(number)[1].data), known) for number in NUMBERS))
+    assert known - drawn - set(NEVER_DRAWN) == LACKING
+    assert set(NEVER_DRAWN) <= known
+    assert {rotor.blades for number in NUMBERS for rotor in sample(number)[1].rotors} == set(range(2, 8))
 
 
 @pytest.mark.parametrize("number", range(len(ALL_KINDS)))
@@ -66,8 +57,10 @@ def test_each_trims_and_its_modes_have_the_names_of_what_takes_part(number):
             trim(aircraft, **flights[name])
         return
     point = trim(aircraft, **flights[name])
-    model = linearize(aircraft, point=point)
     assert point.residual < 1e-8
+    if has_two_blades(aircraft):
+        return  # without a constant matrix
+    model = linearize(aircraft, point=point)
     assert np.isfinite(model.a).all()
     assert mode_faults(model) == []
 

@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from test_commands import call, failure, output
 
-from sbs_sim import Case, simulate, simulate_batch
+from sbs_sim import Case, Controller, Sensors, simulate, simulate_batch
 from sbs_sim.analysis.monte_carlo import OUTPUTS, SHARES, batch_to_csv, batch_to_dict, gust_cases, quantities
 from sbs_sim.analysis.monte_carlo_plots import SHOWN, batch_figure
-from sbs_sim.errors import AircraftError, BatchError, SimulationError
-from sbs_sim.flight.trim_point import TrimCondition
+from sbs_sim.commands.batch import make_parser
+from sbs_sim.commands.common import UsageError
+from sbs_sim.commands.controller_arguments import controller
+from sbs_sim.errors import AircraftError, BatchError, PilotError, SimulationError
+from sbs_sim.flight.trim_point import Fidelity, TrimCondition
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.model.state import ATTITUDE
@@ -167,3 +170,72 @@ def test_flights_of_which_none_begins_are_reported_with_their_reasons(tmp_path):
 def test_the_command_says_what_is_wrong_in_one_line():
     assert failure("batch", "--flights", 0) == "flights = 0: allowed are integers from 1 to 1000000"
     assert failure("batch", "--workers", 2, "--dask", "x").startswith("workers = 2: not allowed with dask")
+
+
+# -- with a controller -----------------------------------------------------------------------------------------------
+
+OWN = """
+import sbs_sim
+
+def still(time, measured, memory, parameters, controls):
+    pass
+
+held = sbs_sim.Controller(still)
+
+def make(aircraft):
+    return sbs_sim.Controller(still, [aircraft.body.mass])
+
+wrong = 3
+"""
+
+
+def test_a_controller_flies_what_tumbles_without_one(tmp_path):
+    """Hands off nearly all have turned over by then; with the controller all stay where they are."""
+    words = ("batch", "--flights", 8, "--duration", 6, "--turbulence", 1.5, "--json", tmp_path / "f.json")
+    output(*words, "--controller", "design", "--spread", "body.mass=0.05", "--noise", "p=0.01", "--lag", 0.03)
+    data = json.loads((tmp_path / "f.json").read_text())
+    assert [flight["error"] for flight in data["flights"]] == [None] * 8
+    assert np.abs(data["percentiles"]["roll [deg]"]).max() < 10.0
+    for name in ("north [m]", "east [m]", "height [m]"):
+        assert np.abs(data["percentiles"][name]).max() < 1.5
+    output(*words)
+    data = json.loads((tmp_path / "f.json").read_text())
+    assert np.abs(data["percentiles"]["roll [deg]"][-1]).max() > 45.0
+
+
+def chosen(sbs, *words):
+    """The controller that a command line selects."""
+    arguments = make_parser().parse_args([str(word) for word in words])
+    return controller(arguments, sbs, TrimCondition(), Fidelity())
+
+
+def test_a_controller_from_a_file_of_python(sbs, tmp_path):
+    file = tmp_path / "own.py"
+    file.write_text(OWN)
+    held = chosen(sbs, "--controller", f"{file}:held", "--delay", 0.02, "--noise", "p=0.1")
+    assert (held.delay, held.lag, held.sensors.noise) == (0.02, 0.0, {"p": 0.1})
+    made = chosen(sbs, "--controller", f"{file}:make")
+    assert made.parameters.tolist() == [sbs.body.mass]
+    for name, text in (
+        ("wrong", "TypeError: 'int'"),
+        ("none", "AttributeError"),
+        ("", "allowed are design"),
+    ):
+        with pytest.raises(PilotError, match=text):
+            chosen(sbs, "--controller", f"{file}:{name}")
+    with pytest.raises(PilotError, match=r"controller = .x.: allowed are design, FILE\.yaml and FILE\.py:NAME"):
+        chosen(sbs, "--controller", "x")
+    with pytest.raises(UsageError, match="allowed with --controller"):
+        chosen(sbs, "--lag", 0.1)
+    assert chosen(sbs) is None
+
+
+def test_the_errors_of_sensors_belong_to_flights(sbs):
+    def still(time, measured, memory, parameters, controls):
+        pass
+
+    own = Controller(still, sensors=Sensors(noise={"p": 0.1}))
+    cases = gust_cases(sbs, 3, {}, turbulence=1.0, controller=own)
+    plain = gust_cases(sbs, 3, {}, turbulence=1.0)
+    assert len({case.controls.sensors.seed for case in cases}) == 3
+    assert [case.wind for case in cases] == [case.wind for case in plain]

@@ -8,10 +8,16 @@ import numpy as np
 import pytest
 from foreign_logs import rewrite
 
-from sbs_sim.commands.plot import main
-from sbs_sim.errors import ExportError
+from sbs_sim import linearize
+from sbs_sim.analysis.linear_flight import linear_flight
+from sbs_sim.commands.plot import condition_of, linear_beside, main
+from sbs_sim.errors import ExportError, LinearizationError, RecordingError
+from sbs_sim.model import state as S
+from sbs_sim.model.frames import euler_to_quaternion
 from sbs_sim.recording import read
-from sbs_sim.recording.plot import flight_figure, plot
+from sbs_sim.recording.overlay import apart, flown_again, overlay_figure
+from sbs_sim.recording.plot import flight_figure, flown_of, plot
+from sbs_sim.recording.recorded_flight import flight_of
 
 LOG = Path(__file__).resolve().parents[2] / "bags" / "hover_step.mcap"
 
@@ -109,3 +115,112 @@ def test_a_flight_that_is_not_there_is_one_line(monkeypatch, capsys, tmp_path):
         main()
     assert capsys.readouterr().err == f"{LOG}: flight 2: allowed are 1 to 1\n"
     assert list(tmp_path.iterdir()) == []
+
+
+# -- over one another ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def again(log):
+    return flown_again(flight_of(log))
+
+
+def test_a_log_flown_again_lies_on_itself(log, again):
+    off = apart(flown_of(log), again)
+    assert off.keys() == set(flown_of(log).panels) - {"controls [deg]", "swashplates [deg]"}
+    assert all(most <= 1e-6 for _, most, _ in off.values()), off
+
+
+def test_a_heavier_aircraft_sinks(log):
+    """The thrust stays near the weight of the log's for a moment: a share of g, against the lift of the air."""
+    heavy = flown_again(flight_of(log), {"body.mass": 1.1 * flight_of(log).aircraft.body.mass})
+    time, height = heavy.panels["position [m]"]["height"]
+    _, before = flown_of(log).panels["position [m]"]["height"]
+    assert heavy.name.startswith("flown again with body.mass=")
+    k = int(np.argmin(abs(time - time[0] - 0.1)))
+    assert height[k] - np.interp(time[k], *flown_of(log).panels["position [m]"]["height"]) == pytest.approx(
+        -0.5 * 9.81 * (0.1 / 1.1) * 0.1**2, rel=0.2
+    )
+    assert len(before)
+
+
+def test_the_title_says_which_is_which_and_what_differs(log, again):
+    other = flown_again(flight_of(log), azimuth_step=np.radians(3.0))
+    figure = overlay_figure([flown_of(log), again, other])
+    (legend,) = figure.legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert [text.split(" (")[0] for text in texts] == ["hover_step.mcap", "flown again", "flown again"]
+    steps = [float(text.split("step ")[1].split(" ms")[0]) for text in texts]
+    assert steps[0] == steps[1] == pytest.approx(1e3 * flight_of(log).step_size, rel=1e-3)
+    assert steps[2] != steps[1]
+    for axes in figure.axes:
+        styles = {line.get_linestyle() for line in axes.lines}
+        assert styles >= {"-", "--", "-."}
+        assert len({line.get_color() for line in axes.lines}) * 3 == len(axes.lines)
+
+
+def test_a_linear_model_holds_for_the_begin_of_a_small_step(log):
+    linear = linear_beside(log)
+    assert "position [m]" not in linear.panels
+    assert "yaw" not in linear.panels["attitude [deg]"]
+    for label, names in {"rates [deg/s]": "pqr", "velocity [m/s]": "uvw"}.items():
+        for name in names:
+            time, values = flown_of(log).panels[label][name]
+            soon = time < time[0] + 1.5
+            ours = np.interp(time[soon], *linear.panels[label][name])
+            assert abs(ours - values[soon]).max() < 0.1 * np.ptp(values) + 0.01, name
+
+
+def test_a_linear_flight_is_that_of_its_poles(sbs):
+    model = linearize(sbs)
+    pole, vectors = np.linalg.eig(model.a)
+    k = int(np.argmax(pole.real))
+    start = model.trim.state + 1e-3 * vectors[:, k].real
+    held = np.tile(model.trim.controls, (11, 1))
+    flown = linear_flight(model, start, held, 0.05)
+    expected = model.trim.state + 1e-3 * (vectors[:, k] * np.exp(pole[k] * 0.05 * np.arange(11))[:, None]).real
+    assert flown == pytest.approx(expected, abs=1e-12)
+    with pytest.raises(LinearizationError, match="have the shapes"):
+        linear_flight(model, start[:8], held, 0.05)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "heading", "condition"),
+    [
+        ((5.0, 0.0, -1.0), 0.3, (5.0, 1.0, 0.0)),
+        ((-3.0, 0.0, 0.0), 0.0, (-3.0, 0.0, 0.0)),
+        ((0.0, 2.0, 0.0), 1.0, (2.0, 0.0, np.pi / 2)),
+    ],
+)
+def test_the_steady_flight_of_a_state(velocity, heading, condition):
+    state = np.zeros(S.BODY_SIZE)
+    state[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(heading, 0.0, 0.0)
+    state[S.VELOCITY : S.RATES] = velocity
+    found = condition_of(state)
+    assert (found.airspeed, found.climb_rate, found.sideslip) == pytest.approx(condition)
+
+
+def test_flights_without_a_common_time_are_refused(log, again, tmp_path):
+    other = read(rewrite(tmp_path / "other.mcap", LOG, lambda now: WALL + now, lambda topic: topic == "/controls"))
+    with pytest.raises(RecordingError, match="no common time"):
+        overlay_figure([flown_of(log), flown_of(other)])
+    with pytest.raises(RecordingError, match="allowed are 4"):
+        overlay_figure([again] * 5)
+
+
+def test_two_logs_and_a_flight_on_a_page(monkeypatch, capsys, tmp_path):
+    page = tmp_path / "both.html"
+    words = ["plot", str(LOG), str(LOG), "--resimulate", "--set", "body.mass=21", "--out", str(page)]
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit, match="0"):
+        main()
+    text = page.read_text()
+    html.parser.HTMLParser().feed(text)
+    assert text.count("<svg") == 1
+    assert "flown again with body.mass=21" in text
+    printed = capsys.readouterr().out
+    assert "hover_step.mcap: largest difference from hover_step.mcap" in printed
+    assert "flown again with body.mass=21: largest difference" in printed
+    monkeypatch.setattr(sys, "argv", ["plot", str(LOG), "--set", "body.mass=21"])
+    with pytest.raises(SystemExit, match="2"):
+        main()

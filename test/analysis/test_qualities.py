@@ -1,5 +1,6 @@
 """Flying qualities: scales, levels, step responses against closed forms and python-control, and some aircraft."""
 
+import dataclasses
 import json
 import math
 import subprocess
@@ -14,6 +15,7 @@ from helpers import build
 from sbs_sim import Aircraft, linearize, qualities
 from sbs_sim.analysis.modes import Mode
 from sbs_sim.analysis.qualities import attitude_transfer, default_airspeeds
+from sbs_sim.analysis.qualities_format import both_headings, both_table
 from sbs_sim.analysis.quality_limits import Scale, limits, scales
 from sbs_sim.analysis.step_response import first_order, first_peak, output_row, step_response, times
 from sbs_sim.errors import LinearizationError
@@ -35,6 +37,22 @@ def oscillation(growth, frequency):
     """Mode with a real part and a magnitude of its pole."""
     pole = complex(growth, math.sqrt(frequency**2 - growth**2))
     return Mode("phugoid", pole, np.ones(1, complex), np.ones(1), "body")
+
+
+def test_the_bare_and_the_controlled_aircraft_beside_each_other(bare):
+    """Here the controlled one is the bare one, which at 20 m/s was judged by its pitch bandwidth alone."""
+    fast = bare.points[1]
+    alone = tuple(tuple(one for one in judged if one.name == "pitch_bandwidth") for judged in fast.judged)
+    held = dataclasses.replace(bare, points=(bare.points[0], dataclasses.replace(fast, judged=alone)))
+    rows = both_table(bare, held, 0)
+    assert {len(row) for row in rows} == {len(both_headings(held))}
+    found = {(row[0], row[4]): row[5:] for row in rows}
+    assert found["pitch bandwidth", "controlled"] == found["pitch bandwidth", "bare"] == ["- (3)", "- (3)"]
+    slow, gone = found["roll bandwidth", "controlled"]
+    assert slow == found["roll bandwidth", "bare"][0]
+    assert gone == ""
+    titles = [row[0] for row in rows]
+    assert titles.index("pitch bandwidth") + 1 == titles.index("pitch bandwidth", titles.index("pitch bandwidth") + 1)
 
 
 # -- scales ----------------------------------------------------------------------------------------------------------
@@ -238,9 +256,9 @@ def test_command_writes_a_page_and_json(tmp_path):
     assert "by rotor radius 0.505 m for 8.178 m: frequencies x 4.02" in result.stdout
     assert "no bandwidth: the phase is -1" in result.stdout
     page = (tmp_path / "index.html").read_text()
-    assert page.count("<svg") == 6
+    assert page.count("<svg") == 7
     assert "not read in the standard" in page
     read = json.loads((tmp_path / "qualities.json").read_text())
     assert read["delay"] == 0.02
     assert [point["airspeed"] for point in read["points"]] == [10.0]
-    assert all((tmp_path / f"figure_0{number}.png").stat().st_size > 10000 for number in range(1, 7))
+    assert all((tmp_path / f"figure_0{number}.png").stat().st_size > 10000 for number in range(1, 8))

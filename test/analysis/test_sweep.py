@@ -1,6 +1,8 @@
 """Sweeps: the same as single trims, in any number of threads, with failures in their places."""
 
+import csv
 import dataclasses
+import io
 import json
 import math
 import threading
@@ -11,8 +13,12 @@ import pytest
 from sbs_sim import linearize, sweep, trim
 from sbs_sim.analysis.export import sweep_to_csv
 from sbs_sim.analysis.sweep import CANCELLED
+from sbs_sim.analysis.sweep_map import sweep_map
+from sbs_sim.analysis.sweep_map_plots import map_figure, save_map
 from sbs_sim.analysis.sweep_plots import root_locus_figure, save_plots, trim_figure
+from sbs_sim.commands.sweep import main
 from sbs_sim.errors import ExportError, SweepError
+from sbs_sim.flight.trim_point import TrimCondition
 from sbs_sim.model import state as S
 from sbs_sim.output.json_text import to_json
 
@@ -354,3 +360,90 @@ def test_plots_that_cannot_be_written_are_reported_in_one_line(speeds, tmp_path)
     (tmp_path / "file").write_text("")
     with pytest.raises(ExportError, match="file: no folder can be made there: File exists"):
         save_plots(speeds, tmp_path / "file")
+
+
+# -- maps ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def chart(sbs):
+    """Masses up to one that is too heavy to fly."""
+    return sweep_map(sbs, ("airspeed", [0.0, 8.0, 16.0]), ("body.mass", [18.0, 24.0, 900.0]), linear=True)
+
+
+def test_a_map_is_what_single_calls_give(sbs, chart):
+    heavy = sbs.with_value("body.mass", 24.0)
+    model = linearize(heavy, airspeed=8.0)
+    found = {name: values[1, 1] for name, (values, _) in chart.quantities.items()}
+    assert found["power"] == model.trim.power.sum()
+    assert found["growth"] == model.poles.real.max()
+    assert found["pitch"] == np.degrees(model.trim.pitch)
+    ends = [(one.range, value) for one, value in zip(heavy.controls, model.trim.controls, strict=True)]
+    margins = [min(value - low, high - value) / (high - low) for (low, high), value in ends]
+    assert found["control margin"] == pytest.approx(100.0 * min(margins))
+    assert chart.missing.tolist() == [[False] * 3, [False] * 3, [True] * 3]
+    assert not chart.doubtful[2].any()
+
+
+def test_any_two_parameters_span_a_map(sbs):
+    """An oblique way through the map is another order of the same points; with both of the aircraft, too."""
+    one = sweep_map(sbs, ("airspeed", [2.0, 6.0]), ("climb_rate", [1.0, 0.0]))
+    other = sweep_map(sbs, ("climb_rate", [1.0, 0.0]), ("airspeed", [2.0, 6.0]))
+    assert np.array_equal(one.quantities["power"][0], other.quantities["power"][0].T)
+    assert "growth" not in one.quantities
+    both = sweep_map(
+        sbs, ("body.mass", [18.0, 22.0]), ("environment.air_density", [1.1, 1.225]), TrimCondition(airspeed=5.0)
+    )
+    changed = sbs.with_values({"body.mass": 22.0, "environment.air_density": 1.1})
+    assert both.quantities["power"][0][0, 1] == trim(changed, airspeed=5.0).power.sum()
+
+
+def test_a_map_shows_where_it_cannot_be_flown(chart, tmp_path):
+    figure = map_figure(chart)
+    assert [axes.get_title() for axes in figure.axes if axes.get_title()] == [
+        "power [W]",
+        "control margin [%]",
+        "pitch [deg]",
+        "roll [deg]",
+        *(f"{name.replace('_', ' ')} [deg]" for name in chart.ranges),
+        "growth [1/s]",
+    ]
+    first = figure.axes[0]
+    assert (first.get_xlabel(), first.get_ylabel()) == ("airspeed [m/s]", "body.mass [kg]")
+    crosses = next(line for line in first.lines if line.get_marker() == "x")
+    assert crosses.get_xydata().tolist() == [[0.0, 900.0], [8.0, 900.0], [16.0, 900.0]]
+    assert {path.name for path in save_map(chart, tmp_path)} == {"map.png", "map.svg"}
+    rows = list(csv.DictReader(io.StringIO(chart.to_csv())))
+    assert len(rows) == 9
+    assert float(rows[4]["power [W]"]) == chart.quantities["power"][0][1, 1]
+    assert rows[8]["power [W]"] == ""
+    assert rows[8]["error"]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "message"),
+    [
+        (("airspeed", [0.0, 1.0]), ("airspeed", [0.0, 1.0]), "another one than the first"),
+        (("airspeed", [0.0]), ("body.mass", [18.0, 20.0]), "airspeed = .*two or more rising or falling"),
+        (("airspeed", [0.0, 1.0]), ("body.mas", [18.0, 20.0]), "parameter 'body.mas'"),
+        (("turn_rate", [0.0, 1.0]), ("body.mass", [18.0, 20.0, 19.0]), "body.mass = .*rising or falling"),
+    ],
+)
+def test_what_is_no_map_is_refused(sbs, first, second, message):
+    with pytest.raises(SweepError, match=message):
+        sweep_map(sbs, first, second)
+
+
+def test_the_command_prints_a_map(sbs, monkeypatch, capsys):
+    monkeypatch.setattr("sbs_sim.commands.common._behave_on_a_terminal", lambda: None)
+    words = ["sweep", "airspeed", "0", "8", "2", "--over", "body.mass", "18", "24", "2", "--trims-only"]
+    monkeypatch.setattr("sys.argv", words)
+    assert main() == 0
+    printed = capsys.readouterr().out.splitlines()
+    start = printed.index("power [W]")
+    assert printed[start + 1].split() == ["body.mass", "[kg]", "\\", "airspeed", "[m/s]", "0", "8"]
+    power = trim(sbs.with_value("body.mass", 24.0), airspeed=8.0).power.sum()
+    assert printed[start + 3].split() == ["24", *printed[start + 3].split()[1:2], f"{power:.0f}"]
+    monkeypatch.setattr("sys.argv", [*words, "--guess-deg", "1", "1", "1", "1"])
+    with pytest.raises(SystemExit, match="2"):
+        main()

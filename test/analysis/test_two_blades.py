@@ -195,6 +195,10 @@ def test_there_is_no_constant_model(two, cruise):
         linearize(two)
     with pytest.raises(LinearizationError, match=says):
         linearize(two, point=cruise)
+    with pytest.raises(
+        LinearizationError, match=r"on a stand is sbs_sim.analysis.isolated_rotor.IsolatedRotor.exponents"
+    ):
+        linearize(build(rotors=[heavier(2)], body={"stand": {"free": []}}))
     found = sweep(two, "airspeed", [0.0, 5.0], workers=1)
     assert [(point.model, point.error) for point in found.points] == [(None, None)] * 2
     assert [effect.axis for effect in trim_effects(two, trim(two))] == ["heave", "roll", "pitch", "yaw"]
@@ -267,9 +271,33 @@ def test_floquet_of_rotors_with_a_drive_is_near_their_averaged_model():
 
 
 def test_rotors_on_drives_of_their_own_trim_in_the_mean():
-    drives = [GOVERNED | {"rotors": [name]} for name in ("R1", "R2")]
-    (said,) = trim(driven(*drives, every_rotor=heavier(2)), 5.0).warnings
-    assert said.startswith("two blades: rotors whose speeds are their own have no common period")
+    """And every other way in says what there is: a flight goes on nearly as its trim."""
+    aircraft = driven(*(GOVERNED | {"rotors": [name]} for name in ("R1", "R2")), every_rotor=heavier(2))
+    period = (
+        "rotors whose speeds are their own have no common period: allowed are all rotors on one drive, or no drives"
+    )
+    point = trim(aircraft, 5.0)
+    mean = "this is the mean flight of three lighter blades in place of two, and there is no linear model"
+    assert point.warnings == (f"two blades: {period}; {mean}",)
+    left = "so that Floquet's method does not apply either; there are `trim` in the mean and `simulate`"
+    with pytest.raises(
+        LinearizationError, match=f"R1 has 2 blades: no constant model describes them; {period}, {left}"
+    ):
+        linearize(aircraft, point=point)
+    with pytest.raises(LinearizationError, match=period):
+        floquet(aircraft, point)
+    (swept,) = sweep(aircraft, "airspeed", [5.0], workers=1).points
+    assert (swept.model, swept.error, swept.warnings) == (None, None, point.warnings)
+    flight = simulate(aircraft, point, point.controls, 0.3)
+    np.testing.assert_allclose(flight["V"], 5.0, atol=0.2)
+    np.testing.assert_allclose(flight["Omega(1)"], aircraft.drive_speed(0), rtol=0.02)
+
+
+def test_a_weak_engine_of_two_blades_is_the_reason():
+    """The search for the reason takes the substitute, too."""
+    weak = {**GOVERNED, "engine": {**GOVERNED["engine"], "max_torque": 5.0}, "governor": {}}
+    with pytest.raises(TrimError, match=r"no trim: drive 1 gives up to 1\.5 N m, its rotors take 8\.27 N m"):
+        trim(driven(weak, every_rotor=heavier(2)))
 
 
 def test_two_blades_autorotate_as_four():
@@ -315,6 +343,13 @@ def test_a_stand_resonates_with_two_blades_as_with_three():
         found.append(exponents[exponents.imag > 0.0][:2])
     np.testing.assert_allclose(found[0].real, found[1].real, rtol=0.05)
     np.testing.assert_allclose(found[0].imag, found[1].imag, rtol=0.05)
+
+
+def test_slender_blades_with_an_unsteady_airfoil_beside_two_blades():
+    """Their circulation follows within a small part of a step of the flapping, so the steps are shorter."""
+    slender = {"unsteady_airfoil": "jones", "chord": {"root": 0.005, "tip": 0.005}, "blades": 5}
+    aircraft = build(rotors=[heavier(2), slender], body={"stand": {"free": []}})
+    assert trim(aircraft).residual < 1e-9
 
 
 def test_a_damper_may_be_missing(two):

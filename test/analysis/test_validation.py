@@ -105,6 +105,17 @@ def test_the_eigenvalues_of_the_inflow_are_the_closed_form(report):
         assert row.ours == pytest.approx(exact, rel=2e-5)
 
 
+def test_hover_of_the_coaxial_rotor(report):
+    """Single rotors within the scatter; two of them need more for one another, less than two in one plane and more."""
+    case = next(case for case in report.cases if case.name == "harrington")
+    merits = {kind: [row for row in case.rows if row.condition.startswith(kind)] for kind in ("coaxial", "single")}
+    assert all(row.ours == pytest.approx(row.published, rel=0.05) for row in merits["single"])
+    assert all(row.ours == pytest.approx(row.published, rel=0.08) for row in merits["coaxial"])
+    ratios = [row for row in case.rows if row.quantity == "P/P_alone"]
+    assert all(1.15 < row.ours < math.sqrt(2.0) for row in ratios)
+    assert all(row.ours == pytest.approx(row.published, rel=0.08) for row in ratios)
+
+
 def test_hover_of_the_model_rotor(report):
     """The least that any blade-element model with momentum inflow must do on these tests."""
     case = next(case for case in report.cases if case.name == "castles_gray")

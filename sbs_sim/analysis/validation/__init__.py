@@ -26,6 +26,7 @@ CASES = (
     "pitt_peters",
     "castles_gray",
     "caradonna_tung",
+    "harrington",
     "hammond",
     "ormiston_hodges",
     "pca2",

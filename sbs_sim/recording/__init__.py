@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from sbs_sim.errors import RecordingError
 
 if TYPE_CHECKING:
-    from sbs_sim.recording.definitions import message_definition, qos_profiles, type_hash
+    from sbs_sim.recording.definitions import message_definition, qos_profiles, service_definitions, type_hash
     from sbs_sim.recording.log import Log, Topic, read
     from sbs_sim.recording.log_writer import LogWriter
     from sbs_sim.recording.recovery import Recovery, recover
@@ -25,6 +25,7 @@ _HOME = {
     "qos_profiles": "definitions",
     "read": "log",
     "recover": "recovery",
+    "service_definitions": "definitions",
     "type_hash": "definitions",
 }
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "qos_profiles",
     "read",
     "recover",
+    "service_definitions",
     "type_hash",
 ]
 

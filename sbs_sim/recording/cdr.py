@@ -74,6 +74,17 @@ class Layout:
         )
 
     @cached_property
+    def doubles(self) -> dict[str, tuple[int, int]]:
+        """Offset [bytes] and number of values of every float64 field, by name; least byte first alone."""
+        found = {}
+        for name in self._columns.keys() & self._formats.keys():
+            kind, offset = self._formats[name]
+            code, shape = (kind, (1,)) if isinstance(kind, str) else kind
+            if code == "<f8":
+                found[name] = offset, shape[0]
+        return found
+
+    @cached_property
     def _marks(self) -> list[tuple[int, bytes]]:
         """Bytes that are alike in all messages of the layout, with their offsets."""
         sizes = ((self._formats[name][1], np.dtype(self._formats[name][0]).itemsize) for name in self._constants)

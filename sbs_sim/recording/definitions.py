@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -92,24 +92,52 @@ def message_definition(type_name: str, find_file: Callable[[str, str], Path]) ->
     RecordingError
         A file cannot be read.
     """
-    seen = {short_name(type_name)}
-
-    def text_of(name: str) -> str:
-        package, kind = name.split("/")
-        try:
-            text = find_file(package, f"msg/{kind}.msg").read_text(encoding="utf-8")
-        except (OSError, LookupError, UnicodeDecodeError) as error:
-            raise RecordingError(f"no definition of message type {name}: {error}") from None
-        parts = [text]
-        for other in sorted({field.type for field in fields_of(text, package)} - PRIMITIVES):
-            if other not in seen:
-                seen.add(other)
-                parts += ["\n", SEPARATOR, f"\nMSG: {other}\n", text_of(other)]
-        return "".join(parts)
-
     if short_name(type_name).count("/") != 1:
         raise RecordingError(f"message type {type_name!r}: allowed is package/msg/Type")
-    return text_of(short_name(type_name))
+    package, kind = short_name(type_name).split("/")
+    return _with_types(_read(find_file, package, "msg", kind), package, {short_name(type_name)}, find_file)
+
+
+def service_definitions(type_name: str, find_file: Callable[[str, str], Path]) -> tuple[str, str]:
+    """Texts of the request and of the response of a service, each as `message_definition` has that of a message.
+
+    Parameters
+    ----------
+    type_name : str
+        package/srv/Type
+    find_file : callable
+        See `message_definition`.
+
+    Raises
+    ------
+    RecordingError
+        A file cannot be read.
+    """
+    if not re.fullmatch(r"\w+/srv/\w+", type_name):
+        raise RecordingError(f"service type {type_name!r}: allowed is package/srv/Type")
+    package, _, kind = type_name.split("/")
+    request, _, response = _read(find_file, package, "srv", kind).partition("---\n")
+    return _with_types(request, package, set(), find_file), _with_types(response, package, set(), find_file)
+
+
+def _with_types(text: str, package: str, seen: set[str], find_file: Callable[[str, str], Path]) -> str:
+    """A definition, and behind it each type in it that has not been seen."""
+    joined = [text]
+    for other in sorted({field.type for field in fields_of(text, package)} - PRIMITIVES - seen):
+        if other not in seen:
+            seen.add(other)
+            inner, kind = other.split("/")
+            joined += ["\n", SEPARATOR, f"\nMSG: {other}\n"]
+            joined.append(_with_types(_read(find_file, inner, "msg", kind), inner, seen, find_file))
+    return "".join(joined)
+
+
+def _read(find_file: Callable[[str, str], Path], package: str, folder: str, kind: str) -> str:
+    try:
+        return find_file(package, f"{folder}/{kind}.{folder}").read_text(encoding="utf-8")
+    except (OSError, LookupError, UnicodeDecodeError) as error:
+        what = {"msg": "message", "srv": "service"}[folder]
+        raise RecordingError(f"no definition of {what} type {package}/{kind}: {error}") from None
 
 
 def type_hash(type_name: str, find_file: Callable[[str, str], Path]) -> str:
@@ -142,15 +170,19 @@ def parse(type_name: str, text: str) -> Definitions:
     RecordingError
         A type contains itself, or types are nested deeper than MAX_NESTING.
     """
-    definitions: Definitions = {}
+    definitions = {name: fields_of(part, name.split("/")[0]) for name, part in parts(type_name, text)}
+    _check_nesting(definitions, short_name(type_name), [], set())
+    return definitions
+
+
+def parts(type_name: str, text: str) -> Iterator[tuple[str, str]]:
+    """Of a joined text the name of each type, package/Type, and its own text."""
     name = short_name(type_name)
     for part in re.split(r"^={3,}\s*$", text, flags=re.MULTILINE):
         head = re.match(r"\s*MSG:\s+(\S+)[^\n]*\n?", part)
         if head:
             name, part = short_name(head[1]), part[head.end() :]
-        definitions[name] = fields_of(part, name.split("/")[0])
-    _check_nesting(definitions, short_name(type_name), [], set())
-    return definitions
+        yield name, part
 
 
 def _check_nesting(definitions: Definitions, kind: str, outer: list[str], checked: set[str]) -> None:

@@ -6,9 +6,11 @@ from ruamel.yaml import YAML
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.stitched_file import encoded
 
 AIRCRAFT_FILE = "aircraft.yaml"
 AIRFOIL_FOLDER = "airfoils"
+STITCHED_FILE = "stitched.npz"
 
 
 def simulation_metadata(simulation: Simulation) -> dict[str, str]:
@@ -20,6 +22,12 @@ def simulation_metadata(simulation: Simulation) -> dict[str, str]:
         "step_size": repr(simulation.step_size),
         "steps_per_tick": repr(simulation.steps_per_tick),
     }
+
+
+def simulation_attachments(simulation: Simulation) -> dict[str, bytes]:
+    """The aircraft as files, and the stitched model if it flies."""
+    files = attachments(simulation.aircraft)
+    return files if simulation.stitched is None else {**files, STITCHED_FILE: encoded(simulation.stitched)}
 
 
 def attachments(aircraft: Aircraft) -> dict[str, bytes]:

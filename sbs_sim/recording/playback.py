@@ -2,7 +2,7 @@
 
 import heapq
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 
@@ -17,6 +17,7 @@ from sbs_sim.recording.log import require_something
 from sbs_sim.recording.scan import Scan, scan
 from sbs_sim.recording.source import DamageError, Source
 
+Progress = Callable[[float, float], None]  # arguments: done, total
 Entry = tuple[int, int, int, int, bytes]  # log time [ns], offset of the chunk and in it, channel, data
 
 

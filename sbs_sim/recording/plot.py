@@ -1,15 +1,13 @@
-"""Plots of a recorded flight over time: attitude, rates, velocity, controls, rotor coordinates, inflow."""
+"""Plots of recorded flights over time: attitude, rates, velocity, controls, rotor coordinates, inflow."""
 
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -19,18 +17,13 @@ from sbs_sim.model.state import CONTROL_NAMES, SWASHPLATE_NAMES
 from sbs_sim.output.files import check_target, write
 from sbs_sim.output.plot_style import COLOURS, DASHES
 from sbs_sim.recording.log import Log, Topic
+from sbs_sim.recording.overlay import SETTINGS, SIMULATION_TIME, Curves, Flown, finish, overlay_figure, panel_rows
 
 Array = NDArray[np.float64]
-Curves = Mapping[str, tuple[Array, Array]]  # name to time and values
 
 SUFFIXES = (".png", ".svg", ".html")
-WIDTH, PANEL_HEIGHT = 8.0, 1.7  # in
-SIMULATION_TIME = "simulation time [s]"
 SAME = 1e-6  # s between stamp and log time where the log is in simulation time
 STAMPED = ("state", "rotors", "inflow", "status")  # topics of the simulator, whose stamps are simulation times
-STILL = 1e-6  # what an axis covers at least
-# Fixed, so that the same log gives the same bytes; text stays text.
-SETTINGS: Any = {"svg.hashsalt": "sbs_sim", "svg.fonttype": "none", "font.size": 9.0}
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
 <style>body {{ font-family: sans-serif; margin: 2em auto; max-width: 60em; }} svg {{ width: 100%; height: auto; }}
@@ -41,14 +34,16 @@ td {{ padding-right: 1.5em; vertical-align: top; }}</style></head>
 """
 
 
-def plot(log: Log, path: str | Path) -> Path:
-    """Draw a flight into a file.
+def plot(log: Log, path: str | Path, beside: Sequence[Flown] = ()) -> Path:
+    """Draw a flight into a file, and others over it.
 
     Parameters
     ----------
     log : Log
     path : path-like
         .png, .svg or .html.
+    beside : sequence of Flown
+        Drawn over it, see `overlay_figure`.
 
     Raises
     ------
@@ -59,14 +54,29 @@ def plot(log: Log, path: str | Path) -> Path:
     """
     target = Path(path)
     check_target(target, SUFFIXES)
-    figure = flight_figure(log)
+    figure = overlay_figure([flown_of(log), *beside]) if beside else flight_figure(log)
     suffix = target.suffix.lower()
     kind = "png" if suffix == ".png" else "svg"
     with rc_context(SETTINGS), io.BytesIO() as stream:
         figure.savefig(stream, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
         data = stream.getvalue()
-    write(target, _page(log, data.decode()) if suffix == ".html" else data)
+    write(target, _page(log, beside, data.decode()) if suffix == ".html" else data)
     return target
+
+
+def flown_of(log: Log) -> Flown:
+    """What is drawn of a log.
+
+    Raises
+    ------
+    RecordingError
+        Nothing is.
+    """
+    panels = {label: curves for label, make in PANELS.items() if (curves := _curves(log, label, make))}
+    if not panels:
+        raise RecordingError(f"{log.path}: nothing to draw, there are {', '.join(log.topics) or 'no topics'}")
+    facts = log.metadata.get("simulation", {}) | log.metadata.get("versions", {})
+    return Flown(log.path.name, panels, facts, _axis(log)[1])
 
 
 def flight_figure(log: Log) -> Figure:
@@ -77,17 +87,12 @@ def flight_figure(log: Log) -> Figure:
     RecordingError
         It holds none of them.
     """
-    panels = [(label, curves) for label, make in PANELS.items() if (curves := _curves(log, label, make))]
-    if not panels:
-        raise RecordingError(f"{log.path}: nothing to draw, there are {', '.join(log.topics) or 'no topics'}")
-    _, axis = _axis(log)
+    flown = flown_of(log)
     with rc_context(SETTINGS):
-        figure = Figure(figsize=(WIDTH, PANEL_HEIGHT * len(panels) + 0.6), layout="constrained")
-        FigureCanvasAgg(figure)
-        rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        for axes, (label, curves) in zip(rows, panels, strict=True):
+        figure, rows = panel_rows(len(flown.panels))
+        for axes, (label, curves) in zip(rows, flown.panels.items(), strict=True):
             _draw(axes, label, curves)
-        rows[-1].set_xlabel(axis)
+        rows[-1].set_xlabel(flown.axis)
     return figure
 
 
@@ -103,19 +108,11 @@ def _curves(log: Log, label: str, make: Callable[[Log], Curves]) -> Curves:
 
 
 def _draw(axes: Axes, label: str, curves: Curves) -> None:
-    largest = STILL
     for i, (name, (time, values)) in enumerate(curves.items()):
         axes.plot(
             time, values, color=COLOURS[i % len(COLOURS)], linestyle=DASHES[i % len(DASHES)], linewidth=1.2, label=name
         )
-        largest = max(largest, float(np.abs(values[np.isfinite(values)]).max(initial=0.0)))
-    low, high = axes.get_ylim()
-    if 0.5 * high - 0.5 * low < 0.5e-3 * largest:  # rounding is no signal; of numbers whose difference may not be one
-        middle = 0.5 * low + 0.5 * high
-        axes.set_ylim(middle - 0.05 * largest, middle + 0.05 * largest)
-    axes.set_ylabel(label)
-    axes.grid(color="#dddddd", linewidth=0.6)
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
+    finish(axes, label, curves.values())
 
 
 # --- time ---------------------------------------------------------------------------------------------------------
@@ -258,8 +255,12 @@ PANELS: dict[str, Callable[[Log], Curves]] = {
 }
 
 
-def _page(log: Log, svg: str) -> str:
+def _page(log: Log, beside: Sequence[Flown], svg: str) -> str:
     facts = {"log": str(log.path), "complete": "yes" if log.complete else "; ".join(log.reasons)}
     facts |= log.metadata.get("simulation", {})
     rows = "".join(f"<tr><td>{escape(key)}</td><td>{escape(value)}</td></tr>" for key, value in facts.items())
-    return PAGE.format(title=escape(log.path.name), rows=rows, figure=svg[svg.index("<svg") :])
+    for other in beside:
+        told = "".join(f"<tr><td>{escape(key)}</td><td>{escape(value)}</td></tr>" for key, value in other.facts.items())
+        rows += f'<tr><th colspan="2">{escape(other.name)}</th></tr>{told}'
+    title = " and ".join([log.path.name, *(other.name for other in beside)])
+    return PAGE.format(title=escape(title), rows=rows, figure=svg[svg.index("<svg") :])

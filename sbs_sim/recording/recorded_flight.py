@@ -15,10 +15,12 @@ from sbs_sim.aircraft import Aircraft
 from sbs_sim.content import ByContent
 from sbs_sim.errors import RecordingError
 from sbs_sim.flight.records import Event
+from sbs_sim.flight.stitched_file import decoded
+from sbs_sim.flight.stitched_simulation import STITCHED
 from sbs_sim.model.gust_table import GustTable
 from sbs_sim.model.state import SPEED
 from sbs_sim.model.wind import Wind
-from sbs_sim.recording.flight_metadata import AIRCRAFT_FILE, AIRFOIL_FOLDER
+from sbs_sim.recording.flight_metadata import AIRCRAFT_FILE, AIRFOIL_FOLDER, STITCHED_FILE
 from sbs_sim.recording.flight_topics import alike
 from sbs_sim.recording.log import Log, Topic
 from sbs_sim.recording.mcap_file import RECOVERY
@@ -49,7 +51,7 @@ class RecordedFlight(ByContent):
     ----------
     aircraft : Aircraft
     options : dict
-        Those of `Simulation`.
+        Those of `Simulation`; "model" is the stitched model that flew, if one did.
     events : tuple of Event
         Everything that acted on the flight, the start first.
     steps : ndarray of int, shape (n,)
@@ -107,6 +109,8 @@ def flight_of(log: Log) -> RecordedFlight:
             raise RecordingError(f"the log has no states for more than {MAX_STATE_GAP:g} s of its flight")
         options = {name: _option(simulation[name], kind) for name, kind in OPTIONS.items()}
         options[GROUND] = float(simulation.get(GROUND, "-inf"))
+        if simulation.get("model") == STITCHED:
+            options["model"] = decoded(log.attachments[STITCHED_FILE], "in the log")
         return RecordedFlight(aircraft, options, events, steps, states, step_size, dict(recorded), log.roles, folder)
     except KeyError as error:
         raise RecordingError(f"the log holds no flight of sbs_sim: {error.args[0]} is missing") from None
@@ -226,9 +230,14 @@ def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, A
             states[:, slice_of(j)] = rotors[f"rotors[{j}].{name}"][where[1]]
         for index, name in enumerate(("uniform", "sine", "cosine"), layout.inflow(j).start):
             states[:, index] = inflow[f"rotors[{j}].{name}"][where[2]]
+        for i, pair in enumerate(layout.wake_pairs(j)):
+            for name, place in zip(("slow", "fast"), pair, strict=True):
+                states[:, place] = inflow[f"rotors[{j}].wake[{i}].{name}"][where[2]]
     for i in range(len(layout.drives)):
         for name, place in layout.drive(i).items():
             states[:, place] = rotors[f"drives[{i}].{DRIVE_FIELDS.get(name, name)}"][where[1]]
+    for i in range(layout.separations):
+        states[:, layout.separations_start + i] = inflow[f"sections[{i}].attached_share"][where[2]]
     for i in range(layout.contacts):
         for axis, place in zip("xy", range(layout.size)[layout.contact(i)], strict=True):
             states[:, place] = body[f"contacts[{i}].deflection_{axis}"][where[0]]

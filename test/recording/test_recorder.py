@@ -1,6 +1,7 @@
 """Flights and their logs: real processes, real DDS, real files."""
 
 import datetime
+import itertools
 import math
 import os
 import signal
@@ -114,9 +115,13 @@ def test_a_flight_of_other_topics_is_recorded_like_any(tmp_path, hover):
         remaps = ["__ns:=/h1", "state:=body/pose", "events:=/ev", "inflow:=air", "rotors:=state"]
         simulator = made.start("simulator", remaps, record=path, components="[simulator, control_mixer, recorder]")
         client.next("/h1/status")
-        for i in range(10):
-            client.publish("/h1/controls", Controls(collective=hover.controls[0] + 0.001 * i))
-            client.spin(0.02)
+        sent, end = itertools.count(), client.next("/h1/status").sim_time + 0.3
+
+        def flown():
+            client.publish("/h1/controls", Controls(collective=hover.controls[0] + 0.001 * (next(sent) % 10)))
+            return client.messages["/h1/status"][-1].sim_time > end
+
+        client.until(flown, "0.3 s of flight")
         (sender,) = client.node.get_publishers_info_by_topic("/h1/body/pose")
         assert simulator.interrupt() == 0, simulator.output
     log = read(path)

@@ -21,14 +21,18 @@ from sbs_sim.recording.recorded_flight import flight_of  # noqa: E402
 
 DRIVE = {
     "rotors": ["R1", "R2"],
+    "inertia": 0.02,
     "engine": {"kind": "engine", "max_torque": 16.0, "lag": 0.05},
     "governor": {"proportional_gain": 5.0, "integral_gain": 2.0},
 }
 
 
+STOP = {"range_deg": [-15.0, 15.0], "stiffness": 400.0, "damping": 1.0}
+
+
 def standing(tmp_path):
-    """Path of an aircraft file: two rotors on a locked hub, with a drive."""
-    data = aircraft_data(options={"elements": 8}, every_rotor={"lag_spring": 60.0, "lag_damping": 0.3})
+    """Path of an aircraft file: two rotors on a locked hub, with a drive, their lag hinges free between stops."""
+    data = aircraft_data(options={"elements": 8}, every_rotor={"lag_stop": STOP})
     data["body"]["stand"] = {"free": []}
     path = tmp_path / "standing.yaml"
     path.write_text(json.dumps(data | {"drives": [DRIVE]}))
@@ -63,6 +67,9 @@ def test_a_run_up_on_a_stand_and_once_more_by_the_service(tmp_path):
     for state, share in zip(begun, (0.0, 0.5), strict=True):
         np.testing.assert_allclose(state, trimmed_state(aircraft, rest, rotor_speed=share), rtol=1e-6, atol=1e-9)
     np.testing.assert_array_equal(flight.states[:, :13], flight.states[0, :13] * np.ones((len(flight.states), 1)))
+    lag = np.degrees(flight.states[:, aircraft.layout.lag(0).start])
+    assert 15.0 < lag.max() < 18.0  # against the stop while the torque is large
+    assert abs(lag[-1]) < 10.0  # and off it by the speed
 
 
 def test_rotors_of_constant_speed_do_not_start_at_rest(tmp_path, sbs):

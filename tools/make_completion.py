@@ -22,7 +22,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / "config" / "completion.bash"
 OWN = ("build", "test", "shell", "python", "completion", "--help", "--version")  # of ./run
 FILES, PATHS, ASSIGNED, AIRCRAFT = "@files", "@paths", "@assigned", "@aircraft"
-KINDS = {"FILE": FILES, "DIR": FILES, "FOLDER": FILES, "PATH=VALUE": ASSIGNED, "PATH=SHARE": ASSIGNED, "NAME": AIRCRAFT}
+KINDS = {
+    "FILE": FILES,
+    "NAME|FILE": FILES,
+    "DIR": FILES,
+    "FOLDER": FILES,
+    "PATH=VALUE": ASSIGNED,
+    "PATH=SHARE": ASSIGNED,
+    "NAME": AIRCRAFT,
+}
 
 HEAD = """# Completion for bash: source this file, or evaluate what `./run completion` or `sbs-sim completion` prints.
 # Made by tools/make_completion.py: do not edit.

@@ -16,9 +16,9 @@ def add_air_arguments(group: Any) -> None:
     )
     group.add_argument(
         "--extent",
-        choices=("point", "rates", "field"),
+        choices=("point", "rates", "field", "elements"),
         help="turbulence is the same everywhere (point, default), turns the air with p, q and r of MIL-F-8785C (rates),"
-        " or is a field in space that every rotor meets where it is (field)",
+        " or is a field in space that every rotor (field) or every blade element (elements) meets where it is",
     )
     group.add_argument(
         "--severity",

@@ -1,4 +1,4 @@
-"""`aircraft`: an aircraft file with a comment behind each key, changed if wanted."""
+"""`aircraft`: an aircraft file with a comment behind each key, changed if wanted, or a URDF."""
 
 import argparse
 import sys
@@ -21,16 +21,22 @@ def make_parser() -> Parser:
         " for an aircraft of your own, or a variant that keeps what --set changed.",
     )
     add_aircraft_arguments(parser)
-    parser.add_argument("--out", metavar="FILE", help="file to write (default: the terminal)")
+    parser.add_argument(
+        "--out",
+        metavar="FILE",
+        help="file to write, .yaml, or .urdf for robotics tools (default: YAML on the terminal)",
+    )
     return parser
 
 
 def _work(arguments: argparse.Namespace) -> None:
     from sbs_sim.aircraft.commented_yaml import commented_yaml
     from sbs_sim.output.files import check_target, write
+    from sbs_sim.output.robot import urdf
 
-    check_target(arguments.out, (".yaml", ".yml"))
-    text = commented_yaml(aircraft(arguments))
+    check_target(arguments.out, (".yaml", ".yml", ".urdf"))
+    convert = urdf if str(arguments.out).lower().endswith(".urdf") else commented_yaml
+    text = convert(aircraft(arguments))
     if arguments.out is None:
         sys.stdout.write(text)
     else:

@@ -16,6 +16,7 @@ from sbs_sim.commands.common import (
     flight,
     print_table,
 )
+from sbs_sim.commands.controller_arguments import add_controller_arguments, controller
 from sbs_sim.errors import BatchError
 from sbs_sim.terminal.command_line import Parser, assignment
 from sbs_sim.terminal.progress import progress_bar
@@ -23,6 +24,7 @@ from sbs_sim.terminal.progress import progress_bar
 if TYPE_CHECKING:
     from sbs_sim.analysis.batch import Batch
 
+HELD_DURATION, CONTROLLED_DURATION = 3.0, 20.0  # s; hands off, an unstable aircraft tumbles after some seconds
 LISTED = 10  # flights that ended early, with their reasons
 
 
@@ -35,14 +37,17 @@ def make_parser() -> Parser:
     """Command line of `batch`."""
     parser = Parser(
         "batch",
-        example="batch --flights 200 --turbulence 1.5 --spread body.mass=0.05 --csv flights.csv",
-        description="Fly many flights through turbulence with fixed controls: each flight starts in trim, holds the"
-        " controls of its trim and has its own turbulence. Runs on all cores or on a cluster.",
+        example="batch --flights 1000 --controller design --turbulence 1.5 --spread body.mass=0.05 --csv flights.csv",
+        description="Fly many flights through turbulence: each flight starts in trim and has its own turbulence. A"
+        " controller flies them, or the controls of the trim are held. Runs on all cores or on a cluster.",
     )
     group = parser.add_argument_group("flights")
     group.add_argument("--flights", type=int, default=1000, metavar="N", help="number of flights (default: 1000)")
     group.add_argument(
-        "--duration", type=float, default=3.0, metavar="X", help="duration of each flight [s] (default: 3)"
+        "--duration",
+        type=float,
+        metavar="X",
+        help="duration of each flight [s] (default: 20 with a controller, 3 without one)",
     )
     group.add_argument(
         "--turbulence",
@@ -63,6 +68,7 @@ def make_parser() -> Parser:
         help="scatter a value of the aircraft file: body.mass=0.05 gives a standard deviation of 5 %%; may be repeated",
     )
     add_flight_arguments(parser)
+    add_controller_arguments(parser)
     group = parser.add_argument_group("work and output")
     add_worker_arguments(group)
     group.add_argument(
@@ -86,6 +92,7 @@ def _work(arguments: argparse.Namespace) -> None:
         raise BatchError(f"--every {arguments.every:g}: allowed are 0.01 to 1e+06 s")
     condition, fidelity = flight(arguments)
     craft = aircraft(arguments)
+    flown = controller(arguments, craft, condition, fidelity)
     cases = gust_cases(
         craft,
         arguments.flights,
@@ -95,11 +102,15 @@ def _work(arguments: argparse.Namespace) -> None:
         seed=arguments.seed,
         spread=dict(arguments.spread),
         air=air_fields(arguments, craft),
+        controller=flown,
     )
+    duration = arguments.duration
+    if duration is None:
+        duration = HELD_DURATION if flown is None else CONTROLLED_DURATION
     with progress_bar(" flights", len(cases)) as progress:
         batch = simulate_cases(
             cases,
-            arguments.duration,
+            duration,
             fidelity,
             execution(arguments, progress),
             every=round(100 * arguments.every),

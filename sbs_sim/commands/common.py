@@ -20,6 +20,7 @@ from sbs_sim.terminal.progress import show_compiling
 
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
+    from sbs_sim.analysis.frequency_response import Actuator
     from sbs_sim.concurrency.parallel import Execution
     from sbs_sim.flight.trim_point import Fidelity, TrimCondition, TrimPoint
 
@@ -87,15 +88,16 @@ def add_aircraft_arguments(parser: Parser) -> None:
     """Aircraft and changes of it."""
     group = parser.add_argument_group("aircraft")
     group.add_argument("--aircraft", default="sbs", metavar="NAME", help="name or file (default: sbs)")
-    group.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        type=assignment,
-        metavar="PATH=VALUE",
-        help="change a value of the aircraft file: body.mass=25, rotors.radius=0.5 (of every rotor),"
+    add_set_argument(
+        group,
+        "change a value of the aircraft file: body.mass=25, rotors.radius=0.5 (of every rotor),"
         " rotors.MR1.hub[0]=0.01; may be repeated, all values are checked together",
     )
+
+
+def add_set_argument(group: Any, text: str) -> None:
+    """Changes of an aircraft, with their help."""
+    group.add_argument("--set", action="append", default=[], type=assignment, metavar="PATH=VALUE", help=text)
 
 
 def add_flight_arguments(parser: Parser) -> None:
@@ -120,6 +122,32 @@ def add_flight_arguments(parser: Parser) -> None:
     group.add_argument(
         "--azimuth-count", type=int, default=12, metavar="N", help="number of azimuths to average over (default: 12)"
     )
+
+
+def add_actuator_argument(group: "argparse._ArgumentGroup") -> None:
+    """Lag of the actuators."""
+    group.add_argument(
+        "--actuator",
+        nargs=2,
+        type=float,
+        metavar=("W", "Z"),
+        help="actuators of second order between controls and blades: natural frequency [rad/s], damping ratio",
+    )
+
+
+def actuator(arguments: argparse.Namespace) -> "Actuator | None":
+    """Of `add_actuator_argument`.
+
+    Raises
+    ------
+    LinearizationError
+        A value out of range.
+    """
+    if arguments.actuator is None:
+        return None
+    from sbs_sim.analysis.frequency_response import Actuator
+
+    return Actuator(*arguments.actuator)
 
 
 def add_guess_argument(parser: argparse.ArgumentParser) -> None:

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 GUST_DELAY, AFTER_GUST = 1.0, 12.0  # s before a gust, and after it
 SETTLING = 10.0  # s, in which the integrals learn the steady wind; not in the figures
-MIN_TURBULENCE_AIRSPEED = 1.0  # m/s at which the frozen field passes where there is no wind
 POSITION = ("north", "east", "down")
 MAX_DURATION = 3600.0  # s
 
@@ -121,7 +120,7 @@ def _work(arguments: argparse.Namespace) -> None:
 
 def _airs(arguments: argparse.Namespace, craft: "Aircraft") -> dict[str, tuple["Wind", float, float]]:
     """What is flown in, for how long before figures are taken, and for how long with them [s]."""
-    from sbs_sim.model.wind import Wind
+    from sbs_sim.model.wind import MIN_TURBULENCE_AIRSPEED, Wind
 
     fields = {
         "velocity": (-arguments.wind, 0.0, 0.0),
@@ -148,7 +147,7 @@ def _airs(arguments: argparse.Namespace, craft: "Aircraft") -> dict[str, tuple["
 def _rule_gusts(arguments: argparse.Namespace) -> dict[str, tuple["Wind", float, float]]:
     """Gusts of a rule that arrive after the integrals have settled."""
     from sbs_sim.flight.gust_standards import certification_gust
-    from sbs_sim.model.wind import Wind
+    from sbs_sim.model.wind import MIN_TURBULENCE_AIRSPEED, Wind
 
     if not arguments.wind >= MIN_TURBULENCE_AIRSPEED:
         allowed = f"at least {MIN_TURBULENCE_AIRSPEED:g} m/s, which takes the gusts of --rule over the aircraft"

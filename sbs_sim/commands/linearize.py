@@ -5,6 +5,9 @@ import math
 from typing import TYPE_CHECKING
 
 from sbs_sim.commands.common import (
+    UsageError,
+    actuator,
+    add_actuator_argument,
     add_flight_arguments,
     add_guess_argument,
     aircraft,
@@ -24,16 +27,17 @@ if TYPE_CHECKING:
 
     from sbs_sim.aircraft import Aircraft
     from sbs_sim.analysis.floquet import Floquet
+    from sbs_sim.analysis.frequency_response import Actuator
+    from sbs_sim.analysis.harmonic import HarmonicModel
     from sbs_sim.analysis.linear_model import LinearModel
     from sbs_sim.analysis.modes import Mode
     from sbs_sim.flight.trim_point import TrimPoint
 
 LEADING = 3  # states named beside a mode
 MIN_SHARE = 0.005  # of the participations that are listed
-MIN_INSTANTS = 48  # of a period for the characteristic exponents
-MAX_STEP = 0.25  # rad of the fastest mode
 ROUNDING = 1e-13  # of a multiplier: what decays further in a period leaves no exponent
 COLUMNS = 10  # of a matrix side by side
+SHOWN = 20  # frequencies of a response
 
 
 def main() -> int:
@@ -62,6 +66,52 @@ def make_parser() -> Parser:
         action="store_true",
         help="reduce to the eight body states, with quasi-static rotors and inflow",
     )
+    group = parser.add_argument_group("frequency responses")
+    group.add_argument(
+        "--bode",
+        action="append",
+        default=[],
+        metavar="CONTROL:OUTPUT",
+        help="print gain and phase from a control to an output or state, such as longitudinal_cyclic:theta; may be"
+        " repeated",
+    )
+    group.add_argument("--delay", type=float, default=0.0, metavar="X", help="of sensors and the like [s] (default: 0)")
+    add_actuator_argument(group)
+    group.add_argument(
+        "--bode-out", metavar="DIR", help="write Bode and Nichols plots (PNG, SVG), CSV and JSON of them"
+    )
+    group = parser.add_argument_group("periodic model")
+    group.add_argument(
+        "--harmonics",
+        type=int,
+        metavar="N",
+        help="print hub loads and vibrations of the steady flight from a model of N harmonics of the blades' passage,"
+        " and with --bode its responses",
+    )
+    group.add_argument(
+        "--at",
+        nargs=3,
+        type=float,
+        action="append",
+        default=[],
+        metavar=("X", "Y", "Z"),
+        help="with --harmonics: also what an accelerometer measures there, from the c.g. in body axes [m]; may be"
+        " repeated",
+    )
+    group.add_argument(
+        "--harmonics-out", metavar="FILE", help="write the model of the harmonics to a .mat, .npz, .json or .h file"
+    )
+    group = parser.add_argument_group("reduced models")
+    group.add_argument(
+        "--reduce",
+        action="store_true",
+        help="print what models with fewer states cost over frequency and in time, and which order is suggested",
+    )
+    group.add_argument(
+        "--reduced-out",
+        metavar="FILE",
+        help="with --reduce: write the suggested model to a .mat, .npz, .json or .h file",
+    )
     group = parser.add_argument_group("output")
     for name, meaning in (
         ("--matrices", "print A and B"),
@@ -70,7 +120,7 @@ def make_parser() -> Parser:
         ("--floquet", "print the characteristic exponents of the periodic model beside the averaged poles"),
     ):
         group.add_argument(name, action="store_true", help=meaning)
-    group.add_argument("--out", metavar="FILE", help="write the model to a .npz, .mat or .json file")
+    group.add_argument("--out", metavar="FILE", help="write the model to a .npz, .mat, .json or .h file")
     parser.hidden(group, "--export", "--out")
     group.add_argument("--json", metavar="FILE", help="write the model to this file as JSON, in SI units and radians")
     return parser
@@ -87,17 +137,29 @@ def _work(arguments: argparse.Namespace) -> None:
 
     check_target(arguments.out, ENCODERS)
     check_target(arguments.json)
+    pairs = _pairs(arguments)
+    if arguments.reduced_out:
+        from sbs_sim.analysis.export import STATE_SPACE_ENCODERS
+
+        check_target(arguments.reduced_out, STATE_SPACE_ENCODERS)
+    lag = actuator(arguments)
+    if arguments.harmonics_out:
+        from sbs_sim.analysis.export import STATE_SPACE_ENCODERS
+
+        check_target(arguments.harmonics_out, STATE_SPACE_ENCODERS)
     craft = aircraft(arguments)
-    if arguments.floquet:
+    is_periodic = arguments.floquet or arguments.harmonics is not None
+    if is_periodic:
         from sbs_sim.analysis.floquet import checked_period
 
         checked_period(craft)  # before the work
     point = solve_trim(craft, *flight(arguments), guess=guess(arguments, craft))
-    wants_model = (
-        arguments.out or arguments.json or arguments.participation or arguments.derivatives or arguments.matrices
-    )
-    if arguments.floquet and has_two_blades(craft) and not wants_model:  # there is no other linear model
-        _print_exponents(craft, point)
+    wants_matrices = arguments.participation or arguments.derivatives or arguments.matrices
+    wants_model = arguments.out or arguments.json or wants_matrices or pairs or arguments.reduce
+    if is_periodic and has_two_blades(craft) and not wants_model:  # there is no other linear model
+        if arguments.floquet:
+            _print_exponents(craft, point)
+        _print_harmonics(craft, point, arguments)
         return
     full = linearize_trim(craft, point, method=arguments.method)
     model = full.quasi_static() if arguments.quasi_static else full
@@ -112,12 +174,118 @@ def _work(arguments: argparse.Namespace) -> None:
     if arguments.floquet:
         from sbs_sim.analysis.floquet import floquet
 
-        _print_floquet(full, floquet(craft, full.trim, _azimuth_count(craft, full)))
+        _print_floquet(full, floquet(craft, full.trim))
+    periodic = _print_harmonics(craft, full.trim, arguments)
     if arguments.derivatives:
         _print_derivatives(full)
+    if pairs:
+        _print_responses(model, pairs, lag, periodic, arguments)
+    if arguments.reduce:
+        _print_reductions(craft, full, arguments.reduced_out)
     if arguments.matrices:
         _print_matrix("A", model.a, model.state_names, model.state_names)
         _print_matrix("B", model.b, model.state_names, model.control_names)
+
+
+def _pairs(arguments: argparse.Namespace) -> list[tuple[str, str]]:
+    """Controls and outputs of the frequency responses.
+
+    Raises
+    ------
+    UsageError
+        An argument without a colon, or one that needs another.
+    """
+    if arguments.bode_out and not arguments.bode:
+        raise UsageError("--bode-out needs --bode CONTROL:OUTPUT")
+    for name in ("at", "harmonics_out"):
+        if getattr(arguments, name) and arguments.harmonics is None:
+            raise UsageError(f"--{name.replace('_', '-')} needs --harmonics N")
+    if arguments.reduced_out and not arguments.reduce:
+        raise UsageError("--reduced-out needs --reduce")
+    for text in arguments.bode:
+        if not all(text.partition(":")[::2]):
+            raise UsageError(f"--bode {text!r}: allowed is CONTROL:OUTPUT, such as longitudinal_cyclic:theta")
+    return [(text.partition(":")[0], text.partition(":")[2]) for text in arguments.bode]
+
+
+def _print_harmonics(craft: "Aircraft", point: "TrimPoint", arguments: argparse.Namespace) -> "HarmonicModel | None":
+    """Hub loads and vibrations of the steady flight, if they are asked for; the model may go to a file."""
+    if arguments.harmonics is None:
+        return None
+    from sbs_sim.analysis.harmonic import periodic_model
+    from sbs_sim.commands.harmonic_tables import print_vibrations
+
+    points = {f"point {i}": position for i, position in enumerate(arguments.at, 1)}
+    periodic = periodic_model(craft, point).with_points(points)
+    model = periodic.harmonic(arguments.harmonics)
+    print_vibrations(model, periodic, float(point.rotor_speed[0]), points)
+    if arguments.harmonics_out:
+        model.state_space.save(arguments.harmonics_out)
+    return model
+
+
+def _print_responses(
+    model: "LinearModel",
+    pairs: list[tuple[str, str]],
+    lag: "Actuator | None",
+    periodic: "HarmonicModel | None",
+    arguments: argparse.Namespace,
+) -> None:
+    """Some frequencies of each response; all of them go to the files."""
+    responses = [model.frequency_response(*pair, delay=arguments.delay, actuator=lag) for pair in pairs]
+    for response in responses:
+        print(f"\n{response.output_name} [{response.output_unit}] by {response.input_name} [{response.input_unit}]")
+        chosen = range(0, len(response.frequencies), max(1, len(response.frequencies) // SHOWN))
+        rows = [
+            [f"{response.frequencies[i]:.4g}", f"{response.gain_db[i]:.2f}", f"{response.phase_deg[i]:.1f}"]
+            for i in chosen
+        ]
+        headings = ["frequency [rad/s]", "gain [dB]", "phase [deg]"]
+        if periodic is not None:
+            from sbs_sim.commands.harmonic_tables import sidebands
+
+            names, columns = sidebands(periodic, response)
+            headings += names
+            rows = [[*row, *(column[i] for column in columns)] for row, i in zip(rows, chosen, strict=True)]
+        print_table(headings, rows, left=())
+    if arguments.bode_out:
+        from sbs_sim.analysis.bode_plots import save_responses
+
+        written = save_responses(responses, arguments.bode_out)
+        print(f"\nwritten: {', '.join(str(path) for path in written)}")
+
+
+def _print_reductions(craft: "Aircraft", full: "LinearModel", out: str | None) -> None:
+    """What each reduced model costs; the suggested one goes to a file."""
+    from sbs_sim.analysis.quality_limits import scales
+    from sbs_sim.analysis.reduced import reductions, suggested
+    from sbs_sim.errors import LinearizationError
+
+    scale = scales(craft)[0]
+    found = reductions(full, scale.speed_up)
+    best = suggested(found)
+    low, high = (frequency * scale.speed_up for frequency in found[0].band)
+    print(f"\nreduced models: largest errors of the rates by their controls, {low:.3g} to {high:.3g} rad/s")
+    rows = [
+        [
+            own.model.name,
+            str(own.model.order),
+            f"{own.worst_gain:.2f}",
+            f"{own.worst_phase:.1f}",
+            f"{own.cost:.4g}",
+            "yes" if own.is_unnoticed else "no",
+            f"{own.step_error:.2%}",
+            "suggested" if own is best else "",
+        ]
+        for own in found
+    ]
+    print_table(["kept", "states", "gain [dB]", "phase [deg]", "cost", "unnoticed", "step", ""], rows, left=(0, 7))
+    if best is None:
+        print("none stays within the envelopes of unnoticeable dynamics: keep all states")
+    if out:
+        if best is None:
+            raise LinearizationError("reduced_out: no reduced model stays within the envelopes")
+        best.model.save(out)
 
 
 def _print_model(craft: "Aircraft", model: "LinearModel") -> None:
@@ -174,11 +342,11 @@ def _print_exponents(craft: "Aircraft", point: "TrimPoint") -> None:
     """Characteristic exponents of a periodic flight with two blades."""
     from sbs_sim.analysis.floquet import floquet
 
-    found = floquet(craft, point, MIN_INSTANTS)
-    found = floquet(craft, point, _instants(found.period, found.poles))
+    found = floquet(craft, point)
     print_heading("periodic flight", craft, point)
     print(f"\nFloquet: period {found.period * 1e3:.4g} ms, no constant model; exponents are known but for multiples of")
     print(f"{2.0 * math.pi / found.period:.5g} rad/s [rad/s]")
+    print(_accuracy(found))
     rows = [
         [*pole_cells(exponent), f"{abs(multiplier):.6g}"]
         for exponent, multiplier in zip(found.exponents, found.multipliers, strict=True)
@@ -188,23 +356,18 @@ def _print_exponents(craft: "Aircraft", point: "TrimPoint") -> None:
     print_limits(point)
 
 
-def _azimuth_count(craft: "Aircraft", model: "LinearModel") -> int:
-    """Instants of a period that the fastest mode needs: rotors of unequal speeds may have a long common period."""
-    from sbs_sim.analysis.periodic import flown_period
+def _accuracy(found: "Floquet") -> str:
+    """Number of instants, and the largest estimated error of an exponent."""
+    import numpy as np
 
-    return _instants(flown_period(craft, model.trim), model.poles)
-
-
-def _instants(period: float, poles: "NDArray[np.complex128]") -> int:
-    from sbs_sim.analysis.floquet import AZIMUTH_COUNTS
-
-    steps = math.ceil(period * abs(poles[-1]) / MAX_STEP)
-    return min(max(MIN_INSTANTS, 2 * steps), AZIMUTH_COUNTS[1])  # two instants make a step
+    left = [error for error in (() if found.error is None else found.error) if not np.isnan(error)]
+    return f"{found.azimuth_count} instants, estimated error {max(left, default=math.nan):.1e} rad/s at most"
 
 
 def _print_floquet(model: "LinearModel", found: "Floquet") -> None:
     """One row for each real pole or pair."""
     print(f"\nFloquet: period {found.period * 1e3:.4g} ms, exponents beside the poles of the averaged model [rad/s]")
+    print(_accuracy(found))
     rows = []
     for pole, exponent, multiplier in zip(found.poles, found.exponents, found.multipliers, strict=True):
         if pole.imag < 0.0:

@@ -26,6 +26,7 @@ from sbs_sim.terminal.progress import progress_bar
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
     from sbs_sim.analysis.sweep import Sweep, SweepPoint
+    from sbs_sim.analysis.sweep_map import SweepMap
 
 # As they are typed, and the names of `sbs_sim.analysis.sweep`; all other parameters are paths.
 TYPED = {
@@ -35,6 +36,7 @@ TYPED = {
     "turn_rate_deg": "turn_rate",
 }
 MAX_POINTS = 100_000
+MAX_REMARKS = 5  # of a map
 
 
 def main() -> int:
@@ -47,8 +49,10 @@ def make_parser() -> Parser:
     parser = Parser(
         "sweep",
         example="sweep airspeed -5 20 41 --out plots --csv sweep.csv",
-        usage="%(prog)s PARAMETER (START STOP COUNT | --values X [X ...]) [options]",
-        description="Trim and linearize an aircraft along one parameter, on all cores or on a cluster.",
+        usage="%(prog)s PARAMETER (START STOP COUNT | --values X [X ...]) [--over PARAMETER START STOP COUNT]"
+        " [options]",
+        description="Trim and linearize an aircraft along one parameter, or over two as a map, on all cores or on a"
+        " cluster.",
     )
     parser.add_argument(
         "parameter",
@@ -60,6 +64,13 @@ def make_parser() -> Parser:
         "range", nargs="*", type=float, metavar="START STOP COUNT", help="COUNT evenly spaced values from START to STOP"
     )
     parser.add_argument("--values", nargs="+", type=float, metavar="X", help="values instead of a range")
+    parser.add_argument(
+        "--over",
+        nargs=4,
+        metavar=("PARAMETER", "START", "STOP", "COUNT"),
+        help="a second parameter, for a map over both: power, distance of the controls from their ends, attitude,"
+        " controls, fastest growth of a mode",
+    )
     add_flight_arguments(parser)
     add_guess_argument(parser)
     group = parser.add_argument_group("work and output")
@@ -72,24 +83,26 @@ def make_parser() -> Parser:
 
 
 def _work(arguments: argparse.Namespace) -> None:
-    typed = arguments.parameter.replace("-", "_")
-    parameter = TYPED.get(typed, arguments.parameter)
-    if f"{typed}_deg" in TYPED:
-        raise UsageError(f"parameter {typed}: angles are typed in degrees, as {typed}_deg")
-    if getattr(arguments, typed, None) is not None and typed in TYPED:
-        raise UsageError(f"--{typed.replace('_', '-')}: not allowed where {typed} is swept")
-    values = _values(arguments)
-    if typed.endswith("_deg") and typed in TYPED:
-        values = [math.radians(value) for value in values]
-    from sbs_sim.analysis.export import sweep_to_csv
-    from sbs_sim.analysis.sweep import sweep_flights
-    from sbs_sim.output.files import check_target, write
-    from sbs_sim.output.json_text import to_json
+    parameter, values = _parameter(arguments, arguments.parameter, _values(arguments))
+    from sbs_sim.output.files import check_target
 
     check_target(arguments.csv)
     check_target(arguments.json)
     craft = aircraft(arguments)
-    _check_parameter(craft, arguments.parameter, typed)
+    _check_parameter(craft, arguments.parameter, parameter)
+    if arguments.over is not None:
+        _map(arguments, craft, (parameter, values))
+    else:
+        _sweep(arguments, craft, parameter, values)
+
+
+def _sweep(arguments: argparse.Namespace, craft: "Aircraft", parameter: str, values: list[float]) -> None:
+    """Along one parameter."""
+    from sbs_sim.analysis.export import sweep_to_csv
+    from sbs_sim.analysis.sweep import sweep_flights
+    from sbs_sim.output.files import write
+    from sbs_sim.output.json_text import to_json
+
     with progress_bar(" points", len(values)) as progress:
         found = sweep_flights(
             craft,
@@ -114,9 +127,52 @@ def _work(arguments: argparse.Namespace) -> None:
         raise SweepError("no point of the sweep has a trim")
 
 
-def _check_parameter(craft: "Aircraft", given: str, typed: str) -> None:
+def _map(arguments: argparse.Namespace, craft: "Aircraft", first: tuple[str, list[float]]) -> None:
+    """Over two parameters."""
+    if arguments.guess_deg is not None or arguments.json:
+        raise UsageError("--guess-deg, --json: not allowed with --over")
+    from sbs_sim.analysis.sweep_map import sweep_map
+    from sbs_sim.output.files import write
+
+    given, *numbers = arguments.over
+    try:
+        start, stop, count = map(float, numbers)
+    except ValueError:
+        raise UsageError(f"--over {' '.join(arguments.over)}: START, STOP and COUNT are numbers") from None
+    second = _parameter(arguments, given, _spaced(start, stop, count))
+    _check_parameter(craft, given, second[0])
+    with progress_bar(" points", len(first[1]) * len(second[1])) as progress:
+        found = sweep_map(
+            craft, first, second, *flight(arguments), execution(arguments, progress), linear=arguments.linear
+        )
+    _print_map(found)
+    if arguments.csv:
+        write(arguments.csv, found.to_csv())
+    if found.missing.all():
+        raise SweepError("no point of the map has a trim")
+    if arguments.out:
+        from sbs_sim.analysis.sweep_map_plots import save_map
+
+        for path in save_map(found, arguments.out):
+            print(f"written: {path}")
+
+
+def _parameter(arguments: argparse.Namespace, given: str, values: list[float]) -> tuple[str, list[float]]:
+    """Parameter as it was typed, as the library calls it, with its values in SI units and radians."""
+    typed = given.replace("-", "_")
+    if f"{typed}_deg" in TYPED:
+        raise UsageError(f"parameter {typed}: angles are typed in degrees, as {typed}_deg")
+    if getattr(arguments, typed, None) is not None and typed in TYPED:
+        raise UsageError(f"--{typed.replace('_', '-')}: not allowed where {typed} is swept")
+    if typed.endswith("_deg") and typed in TYPED:
+        values = [math.radians(value) for value in values]
+    return TYPED.get(typed, given), values
+
+
+def _check_parameter(craft: "Aircraft", given: str, parameter: str) -> None:
     """Raise SweepError for what is no parameter, with those that can be typed."""
-    if typed in TYPED:
+    typed = given.replace("-", "_")
+    if typed in TYPED or parameter in TYPED.values():
         return
     try:
         craft.value(given)
@@ -139,7 +195,10 @@ def _values(arguments: argparse.Namespace) -> list[float]:
         return list(arguments.values)
     if len(arguments.range) != 3:
         raise UsageError("needed are START STOP COUNT, or --values")
-    start, stop, count = arguments.range
+    return _spaced(*arguments.range)
+
+
+def _spaced(start: float, stop: float, count: float) -> list[float]:
     if not (1 <= count <= MAX_POINTS and count == int(count)):
         raise UsageError(f"COUNT = {count:g}: allowed are integers from 1 to {MAX_POINTS}")
     steps = max(int(count) - 1, 1)
@@ -182,6 +241,36 @@ def _print_sweep(found: "Sweep") -> None:
             print(f"{found.parameter} {value:g}: {OUTSIDE}: {'; '.join(joined(point.warnings))}")
 
 
+def _print_map(found: "SweepMap") -> None:
+    """A table of each quantity, rows over the second parameter, and where the model does not hold."""
+    from sbs_sim.output.units import label
+    from sbs_sim.output.warnings_text import joined
+
+    (x, first), (y, second) = found.axes
+    heading = [f"{label(found.other, second)} \\ {label(found.parameter, first)}", *(f"{value:.6g}" for value in x)]
+    for name, (values, unit) in found.quantities.items():
+        print(label(name.replace("_", " "), unit))
+        digits = 0 if name == "power" else 2
+        rows = []
+        for value, row, doubt in zip(y, values, found.doubtful, strict=True):
+            cells = [
+                "-" if math.isnan(one) else fixed(one, digits) + "*" * bool(d)
+                for one, d in zip(row, doubt, strict=True)
+            ]
+            rows.append([f"{value:.6g}", *cells])
+        print_table(heading, rows)
+        print()
+    lines = dict.fromkeys(text for point in found.points if point.trim for text in joined(point.trim.warnings))
+    limits = dict.fromkeys(text for point in found.points if point.trim for text in point.trim.beyond_limits)
+    for mark, texts in ((OUTSIDE, lines), ("beyond its limits", limits)):
+        for text in list(texts)[:MAX_REMARKS]:
+            print(f"* {mark}: {text}")
+        if len(texts) > MAX_REMARKS:
+            print(f"* {mark}: and {len(texts) - MAX_REMARKS} more, see --csv")
+    for text in list(dict.fromkeys(point.error for point in found.points if point.error))[:MAX_REMARKS]:
+        print(f"- {text}")
+
+
 def _error(found: "Sweep", shown: float, point: "SweepPoint") -> str:
     """What is wrong with a point; with an angle that was typed in degrees, in degrees."""
     try:
@@ -193,7 +282,7 @@ def _error(found: "Sweep", shown: float, point: "SweepPoint") -> str:
 
 
 def _growing(point: "SweepPoint") -> str:
-    """Modes that grow."""
+    """Modes that grow, or why they are not known."""
     if point.model is None:
-        return ""
+        return "" if point.error else "two blades: no linear model"
     return "; ".join(mode.name for mode in point.model.modes if mode.is_growing)

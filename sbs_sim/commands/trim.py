@@ -134,12 +134,13 @@ def _rotor_rows(craft: "Aircraft", point: "TrimPoint") -> list[list[str]]:
         rows.append(["speed [rpm]", *(fixed(speed * RPM, 2) for speed in point.rotor_speed.tolist())])
     for name, angles in zip(SWASHPLATE_NAMES, point.swashplate[: len(craft.rotors)].T, strict=True):
         rows.append([f"{name} [deg]", *(fixed(angle * DEGREES, 4) for angle in angles)])
-    families: dict[str, dict[str, list[str]]] = {"flap": {}, "lag": {}, "inflow": {}}
+    families: dict[str, dict[str, list[str]]] = {"flap": {}, "lag": {}, "inflow": {}, "wake": {}}
     for name, value in zip(point.state_names, point.state, strict=True):
         part = part_of(name)
         if part.family in families and not part.is_rate:
-            is_angle = part.family != "inflow"
-            label = f"{part.family} {name.partition('(')[0]} {'[deg]' if is_angle else '[1]'}"
+            is_angle = part.family not in ("inflow", "wake")
+            own = name.partition("(")[0].removeprefix("wake_")
+            label = f"{part.family} {own} {'[deg]' if is_angle else '[1]'}"
             # rotors may have unequal numbers of blades, and so of coordinates
             row = families[part.family].setdefault(label, [""] * len(craft.rotors))
             row[part.rotor] = fixed(value * DEGREES, 4) if is_angle else fixed(value, 6)

@@ -64,12 +64,9 @@ class _Version(argparse._VersionAction):
 
 def version_line() -> str:
     """Name and version of the package."""
-    from importlib.metadata import PackageNotFoundError, version
+    import sbs_sim
 
-    try:
-        return f"sbs_sim {version('sbs_sim')}"
-    except PackageNotFoundError:
-        return "sbs_sim, not installed"
+    return f"sbs_sim {sbs_sim.__version__}"
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

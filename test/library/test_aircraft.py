@@ -376,11 +376,12 @@ def schema_leaves(schema, path=()):
         yield path
 
 
-# in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py, test_descent.py
+# in the place of other keys, or of what sbs does not have: test_atmosphere.py, test_surfaces.py, test_descent.py,
+# test_ring.py
 ELSEWHERE = ("drives", "stand", "altitude", "temperature_offset", "surfaces", "fuselage", "flap_hinge", "schedule")
 ELSEWHERE += ("ground", "contact_points")
 ELSEWHERE += ("quarter_chord", "chordwise_cg", "undersling")
-ELSEWHERE += ("descent", "tip_loss_model", "profile_drag")
+ELSEWHERE += ("descent", "ring_unsteadiness", "tip_loss_model", "profile_drag", "unsteady_airfoil", "dynamic_stall")
 LEAVES = [
     path
     for path in schema_leaves(SCHEMA)

@@ -241,6 +241,16 @@ def test_a_symmetric_polar_is_mirrored(tmp_path):
     np.testing.assert_allclose(table.cl[0], np.arange(-10, 11, 2) / 10)
 
 
+def test_a_table_for_all_reynolds_numbers_is_that_at_one(tmp_path):
+    """So that --reynolds, which C81 tables need, takes polars without a number, too."""
+    table, _ = table_of(
+        "w", polars(write(tmp_path, "a.csv", "alpha_deg,cl,cd\n-5,-0.5,0.01\n0,0,0.01\n5,0.5,0.01")), None, 10.0
+    )
+    assert at_reynolds(table, 3e5) is table
+    with pytest.raises(AirfoilError, match=r"Reynolds number 300000: allowed is 1e\+06$"):
+        at_reynolds(replace(table, numbers=np.array([1e6])), 3e5)
+
+
 @pytest.mark.parametrize("name", ["sc1095r8", "naca0015"])
 def test_c81_tables_come_back(tmp_path, name):
     """Within the four decimals of a C81 table, and what 99 angles lose, which the writer tells."""

@@ -160,12 +160,21 @@ ALLOWED = {
         "sbs_sim.model",
         "sbs_sim.output",
     ],
+    "sbs_sim.sensors": [
+        "sbs_sim.aircraft",
+        "sbs_sim.checks",
+        "sbs_sim.errors",
+        "sbs_sim.flight",
+        "sbs_sim.model",
+        "sbs_sim.sensors",
+    ],
     "sbs_sim.flight.mixer": ["sbs_sim.aircraft", "sbs_sim.model", "sbs_sim.checks", "sbs_sim.errors"],
 }
 FORBIDDEN = {
     "sbs_sim.analysis": ["sbs_sim.nodes", "sbs_sim.recording", "sbs_sim.flight_loop"],
     "sbs_sim.recording": ["sbs_sim.nodes"],
     "sbs_sim.pilot": ["sbs_sim.nodes", "sbs_sim.recording", "sbs_sim.flight_loop"],
+    "sbs_sim.ardupilot": ["sbs_sim.nodes", "sbs_sim.recording", "sbs_sim.flight_loop"],
     "sbs_sim.flight": [
         "sbs_sim.analysis",
         "sbs_sim.nodes",

@@ -150,7 +150,8 @@ def test_trim_of_a_file_with_unequal_rotors():
 def test_an_aircraft_without_a_period_is_refused_before_the_work():
     refused = call("linearize", "--aircraft", "quadrotor", "--floquet")
     assert (refused.returncode, refused.stdout) == (1, "")
-    assert refused.stderr == "rotors whose speeds are their own have no common period\n"
+    allowed = "allowed are all rotors on one drive, or no drives"
+    assert refused.stderr == f"rotors whose speeds are their own have no common period: {allowed}\n"
 
 
 def test_linearize_prints_modes(sbs, tmp_path):
@@ -297,6 +298,15 @@ FAILURES = {
     "unknown parameter": (("sweep", "body.mas", "1", "2", "2"), "parameter 'body.mas': allowed are airspeed, "),
     "unknown limit": (("gusts", "--limit", "wings=1"), "limit 'wings': unknown, allowed are u, v, w, "),
     "no turbulence": (("gusts", "--turbulence", "-1"), "turbulence_intensity.x = -1.0: allowed are 0 to 100 m/s"),
+    "height of a severity": (
+        ("gusts", "--severity", "light", "--height", "1e9"),
+        "height = 1000000000.0: allowed are -1000 to 24384 m",
+    ),
+    "no gust file": (("gusts", "--gust-file", "nothing.csv"), "nothing.csv: No such file or directory"),
+    "gradient of a rule": (
+        ("gusts", "--rule", "cs25", "--gradient", "200"),
+        "gradient = 200.0: allowed are 9 to 107 m",
+    ),
     "workers": (("sweep", "airspeed", "1", "2", "2", "--workers", "0"), "workers = 0: allowed are integers "),
 }
 

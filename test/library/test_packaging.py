@@ -22,26 +22,51 @@ VERSION = ElementTree.parse(ROOT / "package.xml").findtext("version")
 PATIENCE = 120.0  # s, generous, for machines that are busy
 
 
-def needed(requirements):
+def needed(requirements, extra=""):
     """Distributions that requirements stand for, with all that those need."""
-    found, waiting = {}, [Requirement(text) for text in requirements]
+    found, waiting = {}, [(Requirement(text), extra) for text in requirements]
     while waiting:
-        requirement = waiting.pop()
-        if requirement.marker is not None and not requirement.marker.evaluate({"extra": ""}):
+        requirement, wanted = waiting.pop()
+        if requirement.marker is not None and not requirement.marker.evaluate({"extra": wanted}):
             continue
         here = importlib.metadata.distribution(requirement.name)
         assert requirement.specifier.contains(here.version, prereleases=True), requirement
         if here.name not in found:
             found[here.name] = here
-            waiting += [Requirement(text) for text in here.requires or ()]
+            waiting += [(Requirement(text), "") for text in here.requires or ()]
     return list(found.values())
+
+
+def required(wheel):
+    """What a wheel says it requires."""
+    with zipfile.ZipFile(wheel) as file:
+        (metadata,) = (name for name in file.namelist() if name.endswith(".dist-info/METADATA"))
+        return importlib.metadata.PathDistribution(zipfile.Path(file, metadata.rpartition("/")[0] + "/")).requires
+
+
+def link(distributions, folder):
+    """Put what distributions have into a folder of modules."""
+    for distribution in distributions:
+        for top in {str(path).split("/")[0] for path in distribution.files if not str(path).startswith("..")}:
+            if not (folder / top).exists():
+                (folder / top).symlink_to(distribution.locate_file(top))
 
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     """A wheel of a copy of the sources: of what git knows, for the folder of the clone has more in it."""
     folder = tmp_path_factory.mktemp("sources")
-    for name in ("setup.py", "setup.cfg", "pyproject.toml", "package.xml", "resource", "config", "sbs_sim", "LICENSE"):
+    for name in (
+        "setup.py",
+        "setup.cfg",
+        "pyproject.toml",
+        "package.xml",
+        "resource",
+        "config",
+        "launch",
+        "sbs_sim",
+        "LICENSE",
+    ):
         (folder / name).symlink_to(ROOT / name)
     made = tmp_path_factory.mktemp("wheel")
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
@@ -60,14 +85,24 @@ def environment(wheel, tmp_path_factory):
     command = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index", wheel]
     subprocess.run(command, check=True, capture_output=True, timeout=PATIENCE)
     site = Path(sysconfig.get_path("purelib", vars={"base": str(folder)}))
-    with zipfile.ZipFile(wheel) as file:
-        (metadata,) = (name for name in file.namelist() if name.endswith(".dist-info/METADATA"))
-        requires = importlib.metadata.PathDistribution(zipfile.Path(file, metadata.rpartition("/")[0] + "/")).requires
-    for distribution in needed(requires):
-        for top in {str(path).split("/")[0] for path in distribution.files if not str(path).startswith("..")}:
-            if not (site / top).exists():
-                (site / top).symlink_to(distribution.locate_file(top))
+    link(needed(required(wheel)), site)
     return folder, {path.name for path in (folder / "bin").iterdir()} - before
+
+
+@pytest.fixture(scope="module")
+def ros_free(wheel, tmp_path_factory):
+    """Folder of what the extra `ros-free` adds."""
+    folder = tmp_path_factory.mktemp("extras")
+    link(needed(required(wheel), "ros-free"), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def logs(wheel, tmp_path_factory):
+    """Folder of what the extra `logs` adds."""
+    folder = tmp_path_factory.mktemp("logs")
+    link(needed(required(wheel), "logs"), folder)
+    return folder
 
 
 def call(environment, *words, **more):
@@ -100,11 +135,37 @@ def test_it_trims_where_nothing_else_is(environment, sbs, tmp_path):
     assert json.loads(file.read_text())["power"] == pytest.approx(expected.power, rel=1e-6)
 
 
-def test_it_reads_logs_and_draws_them(environment, tmp_path):
+def test_it_reads_logs_and_draws_them(environment, logs, ros_free, tmp_path):
     log, picture = ROOT / "bags" / "hover_step.mcap", tmp_path / "log.svg"
-    result = call(environment, "sbs-sim", "plot", log, "--out", picture, NUMBA_DISABLE_JIT="1")
+    words = ("sbs-sim", "plot", log, "--out", picture)
+    refused = call(environment, *words, NUMBA_DISABLE_JIT="1")
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert refused.stderr.count("\n") == 1
+    assert "remedy: python3 -m pip install 'sbs-sim[" in refused.stderr
+    logs_alone = call(environment, *words, NUMBA_DISABLE_JIT="1", PYTHONPATH=logs)
+    assert (logs_alone.returncode, logs_alone.stdout) == (1, "")
+    assert logs_alone.stderr.count("\n") == 1
+    assert "remedy: python3 -m pip install 'sbs-sim[plots]'" in logs_alone.stderr
+    result = call(environment, *words, NUMBA_DISABLE_JIT="1", PYTHONPATH=ros_free)
     assert (result.returncode, result.stderr) == (0, "")
     assert picture.read_text().startswith("<?xml")
+
+
+def test_it_recovers_logs_without_ros(environment, ros_free, tmp_path):
+    recover = ("replay", ROOT / "bags" / "hover_step.mcap", "--recover", "--out", tmp_path)
+    result = call(environment, "sbs-sim", *recover, NUMBA_DISABLE_JIT="1", PYTHONPATH=ros_free)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "nothing was lost" in result.stdout
+    refused = call(environment, "sbs-sim", *recover[:2], NUMBA_DISABLE_JIT="1", PYTHONPATH=ros_free)
+    assert refused.stderr.startswith("replay needs ROS 2")
+
+
+def test_its_types_are_for_others(environment):
+    code = (
+        "import sbs_sim, pathlib; place = pathlib.Path(sbs_sim.__file__).parent;"
+        "print(sbs_sim.__version__, (place / 'py.typed').is_file())"
+    )
+    assert call(environment, "python", "-c", code).stdout.split() == [VERSION, "True"]
 
 
 def test_what_needs_ros_says_so_in_one_line(environment):
@@ -124,6 +185,7 @@ def test_everything_that_is_shipped_is_found_there(environment):
     place, package, counted = call(environment, "python", "-c", code, NUMBA_DISABLE_JIT="1").stdout.splitlines()
     assert all(Path(found).is_relative_to(environment[0]) for found in (place, package))
     shipped = [path for path in (ROOT / "config").rglob("*.*") if not path.name.endswith("~")]
+    assert Path(place).parent == Path(package).parent
     assert counted == f"False {len(shipped)}"
     printed = call(environment, "sbs-sim", "completion").stdout
     assert Path(printed.removeprefix("source ").strip()).read_text() == (ROOT / "config/completion.bash").read_text()

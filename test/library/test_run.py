@@ -14,8 +14,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 EXECUTABLES = (
-    "simulator control_mixer analysis hover_hold teleop joystick replay cockpit"
-    " trim linearize sweep qualities batch reproduce validate gusts plot airfoil aircraft"
+    "simulator control_mixer analysis hover_hold excite frames teleop joystick replay cockpit ardupilot"
+    " trim linearize sweep qualities identify performance stitch design batch"
+    " reproduce validate gusts plot airfoil aircraft"
 )
 
 # What the script itself calls; everything else is taken away from it.

@@ -1,0 +1,1 @@
+"""ArduPilot's side of a flight: its packets, its servos, its parameters. No ROS, no sockets."""

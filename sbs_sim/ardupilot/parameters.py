@@ -1,0 +1,247 @@
+"""ArduPilot's parameters for an aircraft, from its linear model in hover.
+
+Each rate loop has one proportional gain: the largest one at which the loop, with the integral part and the delays that
+ArduPilot has, keeps the margins below. The rate of the angle loop and the integral gain follow from its crossover.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbs_sim.aircraft import Aircraft
+from sbs_sim.analysis.linear_model import LinearModel
+from sbs_sim.analysis.linearize import linearize
+from sbs_sim.ardupilot.servos import CYCLIC_TRAVEL, FIRST_PULSE, LAST_PULSE, Head, Servos
+from sbs_sim.errors import ArduPilotError
+
+Array = NDArray[np.float64]
+
+TRANSVERSE = "transverse"
+TYPES = dict(zip(("h1", "h3_140", "h3_120", "h4_90", "h4_45"), range(1, 6), strict=True))  # H_SW_TYPE
+HELI_DUAL, TRANSVERSE_MODE = 11, 1
+MOTORS = (33, 34, 35, 36, 37, 38)  # functions of the servos of both swashplates
+ROTOR_SPEED, ROTOR_SPEED_CHANNEL = 31, 8  # function and servo of the throttle
+
+# Hz; ArduPilot arms if its gyros have at least 1.8 times the rate of its loops.
+LOOP_RATE, FRAME_RATE = 200.0, 400.0
+# Hz, of the error of a rate: the differential tilt of the discs shakes the blades in lag at the rotor's speed.
+FILTERS = {"RLL": 20.0, "PIT": 20.0, "YAW": 2.0}
+DELAY = 1.5 / LOOP_RATE  # s: a loop from sensor to servo, and half of one that the servo holds
+GAIN_MARGIN, PHASE_MARGIN = 10 ** (8.0 / 20.0), math.radians(50.0)
+MAX_CROSSOVER = 12.0  # rad/s of a rate loop
+INTEGRAL, ANGLE = 0.15, 0.35  # of the crossover: integral gain over the proportional one, and rate of the angle loop
+FREQUENCIES = np.geomspace(0.3, 400.0, 1500)  # rad/s
+GAINS = np.geomspace(1e-3, 20.0, 400)
+MAX_ANGLE_GAIN = 6.0
+WAY = 6.0  # rad/s, where a control is to turn the aircraft its way
+LIFT_GAIN = 0.5  # of the loop of vertical acceleration, at frequencies at which the inflow follows
+BLADE_PITCH_RANGE = (0.0, 16.0)  # deg, that the collective stick of ArduPilot has
+FULL = 4500  # H_CYC_MAX: all of the travel
+AXES = {"RLL": (1, "p"), "PIT": (2, "q"), "YAW": (3, "r")}  # column of the axis' control, and its rate
+
+
+class RateLoop(NamedTuple):
+    """Gains of a rate loop of ArduPilot [of full output over rad/s], and what they give."""
+
+    proportional: float
+    integral: float
+    angle: float
+    crossover: float
+    gain_margin: float
+    phase_margin: float
+
+
+def parameter_lines(aircraft: Aircraft, servos: Servos) -> list[str]:
+    """A parameter file for an aircraft, one line each, for ArduPilot's helicopter firmware.
+
+    Raises
+    ------
+    ArduPilotError
+        The servo file is of another frame, or its heads stand otherwise than that frame has them.
+    TrimError, LinearizationError
+        See `sbs_sim.linearize`.
+    """
+    left, right = _transverse_heads(aircraft, servos)
+    model = linearize(_with_axes(aircraft, left, right))
+    names = [model.control_names[i] for i in aircraft.axis_controls]
+    unit = CYCLIC_TRAVEL * left.gain  # blade pitch of a full output of each axis
+    values = _frame(left, right) | _collective(model, left, names[0])
+    lines = [
+        f"# {aircraft.name}: ArduPilot's helicopter firmware, dual frame, transverse. Rates: proportional gains for"
+    ]
+    lines.append(
+        f"# {20 * math.log10(GAIN_MARGIN):.0f} dB and {math.degrees(PHASE_MARGIN):.0f} deg at least, in hover."
+    )
+    for axis, (column, rate) in AXES.items():
+        loop = rate_loop(model, names[column], rate, unit, FILTERS[axis])
+        lines.append(
+            f"# {rate}: crossover {loop.crossover:.2f} rad/s, gain margin {20 * math.log10(loop.gain_margin):.1f} dB,"
+            f" phase margin {math.degrees(loop.phase_margin):.0f} deg"
+        )
+        values |= _axis(axis, loop)
+    return [*lines, *(f"{name:<16} {value:.6g}" for name, value in values.items())]
+
+
+def rate_loop(model: LinearModel, control: str, rate: str, unit: float, filter_frequency: float) -> RateLoop:
+    """Gains of a rate loop.
+
+    Parameters
+    ----------
+    model : LinearModel
+    control : str
+        Of the axis [rad].
+    rate : str
+        State that is fed back [rad/s].
+    unit : float
+        Control at full output [rad].
+    filter_frequency : float
+        Of a low pass of first order on the error [Hz].
+
+    Raises
+    ------
+    ArduPilotError
+        The control turns the aircraft the other way, or no gain keeps the margins.
+    """
+    response = model.frequency_response(control, rate, FREQUENCIES, DELAY).response * unit
+    if np.interp(WAY, FREQUENCIES, response.imag) > 0.0:  # an integration has a phase of -90 deg
+        raise ArduPilotError(f"{control}: turns {rate} the wrong way, see the signs in the servo file")
+    response = response / (1.0 + 1j * FREQUENCIES / (math.tau * filter_frequency))
+    best = None
+    for gain in GAINS:
+        crossover = _crossover(gain * response)
+        if crossover is None:
+            continue
+        if crossover > MAX_CROSSOVER:
+            break
+        integral = INTEGRAL * crossover
+        loop = gain * (1.0 + integral / (1j * FREQUENCIES)) * response
+        margins = _margins(loop)
+        if margins[0] >= GAIN_MARGIN and margins[1] >= PHASE_MARGIN:
+            angle = min(ANGLE * crossover, MAX_ANGLE_GAIN)
+            best = RateLoop(float(gain), float(gain * integral), angle, crossover, *margins)
+    if best is None:
+        raise ArduPilotError(f"{control}: no gain on {rate} keeps the margins")
+    return best
+
+
+def _crossover(loop: NDArray[np.complex128]) -> float | None:
+    """Highest frequency of unit gain [rad/s]; None where there is none."""
+    above = np.flatnonzero(np.abs(loop) >= 1.0)
+    return None if not len(above) or above[-1] == len(loop) - 1 else float(FREQUENCIES[above[-1]])
+
+
+def _margins(loop: NDArray[np.complex128]) -> tuple[float, float]:
+    """Least gain margin at the crossings of the negative real axis beyond the crossover, and least phase margin."""
+    gain, angle = np.abs(loop), np.angle(-loop)  # angle from the critical direction
+    last = int(np.flatnonzero(gain >= 1.0)[-1])
+    crossings = np.flatnonzero((angle[:-1] * angle[1:] <= 0.0) & (np.abs(angle[:-1] - angle[1:]) < math.pi))
+    beyond = crossings[crossings >= last]
+    gain_margin = float(1.0 / gain[beyond].max()) if len(beyond) else math.inf
+    unit = np.flatnonzero((gain[:-1] - 1.0) * (gain[1:] - 1.0) <= 0.0)
+    return gain_margin, float(np.abs(angle[unit]).min())
+
+
+def _transverse_heads(aircraft: Aircraft, servos: Servos) -> tuple[Head, Head]:
+    """Heads on the left and right.
+
+    Raises
+    ------
+    ArduPilotError
+        See `parameter_lines`.
+    """
+    if servos.frame != TRANSVERSE or len(servos.heads) != len(aircraft.rotors) or len(servos.heads) != 2:
+        raise ArduPilotError(f"frame: {servos.frame}: parameters are written for {TRANSVERSE} with two heads")
+    hubs = {rotor.name: rotor.hub for rotor in aircraft.rotors}
+    left, right = servos.heads
+    if not hubs[left.rotor][1] < 0.0 < hubs[right.rotor][1]:
+        raise ArduPilotError("heads: allowed for transverse is the left one first, then the right one")
+    if left.blade_pitch != right.blade_pitch:
+        raise ArduPilotError("heads: allowed for transverse is the same blade_pitch_deg on both")
+    if not aircraft.has_axes:
+        raise ArduPilotError("controls: allowed for parameters are those with all four axes")
+    return left, right
+
+
+def _with_axes(aircraft: Aircraft, left: Head, right: Head) -> Aircraft:
+    """Aircraft whose controls move the heads as ArduPilot does.
+
+    Roll is differential collective, yaw is differential longitudinal cyclic.
+    """
+    heave, roll, pitch, yaw = (aircraft.control_names[i] for i in aircraft.axis_controls)
+    changes = {}
+    for head, side in ((left, 1.0), (right, -1.0)):
+        sign = float(head.longitudinal_sign)
+        changes[f"rotors.{head.rotor}.mixing"] = {
+            "collective": {heave: 1.0, roll: side},
+            "lateral_cyclic": {},
+            "longitudinal_cyclic": {pitch: sign, yaw: -side * sign},
+        }
+    return aircraft.with_values(changes)
+
+
+def _pulse(head: Head, blade_pitch: float) -> float:
+    """Pulse of all servos of a head [us] at a collective [rad]."""
+    travel = (blade_pitch - head.blade_pitch[0]) / head.gain
+    return FIRST_PULSE + travel * (LAST_PULSE - FIRST_PULSE)
+
+
+def _frame(left: Head, right: Head) -> dict[str, float]:
+    """Parameters of the frame and its servos."""
+    values: dict[str, float] = {
+        "FRAME_CLASS": HELI_DUAL,
+        "H_DUAL_MODE": TRANSVERSE_MODE,
+        "H_SW_TYPE": TYPES[left.swashplate],
+        "H_SW2_TYPE": TYPES[right.swashplate],
+        "H_CYC_MAX": FULL,
+        "H_DCP_SCALER": 1.0,
+        "H_DCP_YAW": 0.0,
+        "H_YAW_SCALER": 1.0,
+        "H_OPTIONS": 0,  # integrals that do not leak: rotors side by side have to hold a trim
+        "ATC_HOVR_ROL_TRM": 0,
+        "SCHED_LOOP_RATE": LOOP_RATE,
+        "SIM_RATE_HZ": FRAME_RATE,
+        "H_RSC_MODE": 2,
+        "H_RSC_SETPOINT": 100,
+        "H_RSC_RAMP_TIME": 2,
+        "H_RSC_RUNUP_TIME": 3,
+        f"SERVO{ROTOR_SPEED_CHANNEL}_FUNCTION": ROTOR_SPEED,
+    }
+    channels = [*left.channels[:3], *right.channels[:3]]
+    for function, channel in zip(MOTORS, channels, strict=True):
+        values |= {f"SERVO{channel}_FUNCTION": function, f"SERVO{channel}_MIN": FIRST_PULSE}
+        values |= {f"SERVO{channel}_MAX": LAST_PULSE, f"SERVO{channel}_TRIM": 0.5 * (FIRST_PULSE + LAST_PULSE)}
+    return values
+
+
+def _collective(model: LinearModel, head: Head, control: str) -> dict[str, float]:
+    """Parameters of collective and vertical motion."""
+    low, high = (math.radians(value) for value in BLADE_PITCH_RANGE)
+    hover = float(model.trim.controls[model.control_names.index(control)])
+    gain = LIFT_GAIN / (_lift(model, control) * (high - low)) * 10.0  # output in thousandths over cm/s^2
+    pulses = [round(_pulse(head, value)) for value in (low, high)]
+    values: dict[str, float] = {"H_COL_MIN": pulses[0], "H_COL_MAX": pulses[1]}
+    values |= {"H_COL2_MIN": pulses[0], "H_COL2_MAX": pulses[1]}
+    values |= {"H_COL_ANG_MIN": BLADE_PITCH_RANGE[0], "H_COL_ANG_MAX": BLADE_PITCH_RANGE[1]}
+    values |= {"H_COL_ZERO_THRST": 0.0, "H_COL_LAND_MIN": 0.0}
+    values |= {"H_COL_HOVER": (hover - low) / (high - low), "H_HOVER_LEARN": 0}
+    return values | {"PSC_ACCZ_P": gain, "PSC_ACCZ_I": 2.0 * gain, "PSC_ACCZ_D": 0.0}
+
+
+def _lift(model: LinearModel, control: str) -> float:
+    """Vertical acceleration over collective [m/s^2/rad], upwards, once the inflow has settled."""
+    response = model.frequency_response(control, "w", FREQUENCIES)
+    index = int(np.argmin(np.abs(FREQUENCIES - 5.0)))
+    return float(np.abs(1j * FREQUENCIES[index] * response.response[index]))
+
+
+def _axis(axis: str, loop: RateLoop) -> dict[str, float]:
+    """Parameters of an axis."""
+    rate, angle = f"ATC_RAT_{axis}_", f"ATC_ANG_{axis}_P"
+    values = {f"{rate}P": loop.proportional, f"{rate}I": loop.integral, f"{rate}D": 0.0, f"{rate}FF": 0.0}
+    values |= {f"{rate}ILMI": 1.0, f"{rate}IMAX": 1.0}
+    values |= {f"{rate}FLTT": FILTERS["RLL"], f"{rate}FLTE": FILTERS[axis], f"{rate}FLTD": 0.0}
+    return values | {angle: loop.angle}

@@ -1,6 +1,7 @@
-"""Writes config/layouts/foxglove.json and plotjuggler.xml: `./run python tools/make_layouts.py`.
+"""Writes config/layouts/foxglove.json, lichtblick.json and plotjuggler.xml: `./run python tools/make_layouts.py`.
 
-Both show the same curves, listed once here. Foxglove can turn signs and angles, PlotJuggler shows SI units as they are.
+All show the same curves, listed once here. Foxglove turns angles into degrees, Lichtblick takes the topics that the
+simulator's server has in degrees, and PlotJuggler shows radians.
 """
 
 import json
@@ -13,7 +14,7 @@ XYZ = ("x", "y", "z")
 CONTROLS = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")
 ROTORS = (0, 1)
 Curve = tuple[str, str, str]  # path of the field, label, what Foxglove does with it
-DEGREES, TURNED, PLAIN = ".@rad2deg", ".@negative", ""
+DEGREES, PLAIN = ".@rad2deg", ""
 
 # tab: plots of it, each a title with the unit in Foxglove and curves
 TABS: dict[str, dict[str, list[Curve]]] = {
@@ -27,7 +28,7 @@ TABS: dict[str, dict[str, list[Curve]]] = {
         ],
         "Attitude, body to NED [-]": [(f"/state.attitude.{axis}", f"q{axis}", PLAIN) for axis in ("w", *XYZ)],
         "Controls [deg]": [(f"/controls.{name}", name, DEGREES) for name in CONTROLS],
-        "Height [m]": [("/state.position.z", "height", TURNED)],
+        "Height [m]": [("/odom.pose.pose.position.z", "height", PLAIN)],
     },
     "Rotors": {
         "Flap a0, a1, b1 [deg]": [
@@ -65,9 +66,10 @@ TABS: dict[str, dict[str, list[Curve]]] = {
 
 
 def main() -> None:
-    """Write both."""
+    """Write all."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     (FOLDER / "foxglove.json").write_text(json.dumps(foxglove(), indent=1) + "\n")
+    (FOLDER / "lichtblick.json").write_text(json.dumps(lichtblick(), indent=1) + "\n")
     tree = ElementTree.ElementTree(plotjuggler())
     ElementTree.indent(tree, " ")
     tree.write(FOLDER / "plotjuggler.xml", encoding="UTF-8", xml_declaration=True)
@@ -105,6 +107,30 @@ def foxglove() -> dict:
         "playbackConfig": {"speed": 1},
         "layout": "Tab!all",
     }
+
+
+def lichtblick() -> dict:
+    """The same for Lichtblick, which knows no modifiers and shows paths and poses, but no odometry."""
+    layout = foxglove()
+    for panel in layout["configById"].values():
+        for path in panel.get("paths", []):
+            path["value"] = in_degrees(path["value"])
+    scene = layout["configById"]["3D!view"]
+    scene["topics"] = {"/odom_path": {"visible": True}, "/odom_pose": {"visible": True}}
+    urdf = {"layerId": "foxglove.Urdf", "sourceType": "topic", "topic": "/robot_description", "visible": True}
+    scene["layers"]["urdf"] = {"instanceId": "urdf", "label": "URDF", "order": 2, **urdf}
+    return layout
+
+
+def in_degrees(path: str) -> str:
+    """The field of the topic in degrees, see sbs_sim/recording/degrees.py, that holds what a path turns into them."""
+    if not path.endswith(DEGREES):
+        return path
+    topic, *fields = path.removesuffix(DEGREES).split(".")
+    holder = -2 if fields[-1] in XYZ else -1
+    name, bracket, index = fields[holder].partition("[")
+    fields[holder] = f"{name}_deg{bracket}{index}"
+    return ".".join([f"{topic}_deg", *fields])
 
 
 def view() -> dict:
@@ -186,7 +212,7 @@ def splitter(parent: ElementTree.Element, orientation: str, count: int) -> Eleme
 
 def plotjuggler_plot(parent: ElementTree.Element, title: str, curves: list[Curve]) -> None:
     """Plot in SI units: degrees of a title are radians here."""
-    area = ElementTree.SubElement(parent, "DockArea", name=title.replace("deg", "rad").replace("Height", "Down"))
+    area = ElementTree.SubElement(parent, "DockArea", name=title.replace("deg", "rad"))
     options = {"mode": "TimeSeries", "style": "Lines", "flip_x": "false", "flip_y": "false"}
     plot = ElementTree.SubElement(area, "plot", options)
     ElementTree.SubElement(plot, "limitY")

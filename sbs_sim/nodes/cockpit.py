@@ -20,7 +20,8 @@ import rclpy.utilities
 from sbs_sim.errors import SbsError
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.confinement import alone_in_domain
-from sbs_sim.nodes.process import DISCOVERY_TIME, run
+from sbs_sim.nodes.process import run
+from sbs_sim.nodes.signals import DISCOVERY_TIME
 from sbs_sim.terminal.command_line import Parser
 
 if TYPE_CHECKING:
@@ -130,10 +131,13 @@ def main(args: list[str] | None = None) -> None:
     own = rclpy.utilities.remove_ros_args(arguments)[1:]
     options = _parse(own)
     ros_arguments = arguments[1 + len(own) :]
-    if (options.attach or options.logs) and (given := {"-p", "--param", "--params-file"} & set(ros_arguments)):
+    given = {"-p", "--param", "--params-file"} & set(ros_arguments) | ({"--foxglove"} if options.foxglove else set())
+    if (options.attach or options.logs) and given:
         make_parser().error(
             f"{min(given)}: parameters go to a simulator that the cockpit starts: not allowed with --attach and --logs"
         )
+    if options.foxglove:
+        ros_arguments = ["--ros-args", "-p", "foxglove:=true", *ros_arguments[1:]]
     end = threading.Event()
     start = CockpitStartup(options, ros_arguments, end)
     code = run(start.nodes, [arguments[0], *ros_arguments], end, first="cockpit")
@@ -174,6 +178,9 @@ def make_parser() -> Parser:
     parser.add_argument("--port", type=int, default=PORT, help=f"port to serve on, 1 to 65535 (default: {PORT})")
     parser.add_argument(
         "--attach", action="store_true", help="join a simulator that is running or is started later; start none"
+    )
+    parser.add_argument(
+        "--foxglove", action="store_true", help="have the simulator serve Foxglove and Lichtblick too, on port 8765"
     )
     parser.add_argument("--logs", default="", metavar="FOLDER", help="show the logs of this folder; start no simulator")
     return parser

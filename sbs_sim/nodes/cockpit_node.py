@@ -28,11 +28,13 @@ from sbs_sim.analysis.control_effects import ControlEffect
 from sbs_sim.analysis.linearize import trim_effects
 from sbs_sim.analysis.trim import trim
 from sbs_sim.cockpit.access import access_check
+from sbs_sim.cockpit.air_panel import SHOWN
 from sbs_sim.cockpit.poles import Pole
 from sbs_sim.cockpit.readouts import Status
 from sbs_sim.cockpit.trim_report import condition_words
 from sbs_sim.cockpit.view import FRAME_PERIOD, LiveFlight, LiveState, View
 from sbs_sim.errors import SbsError, SimulationError
+from sbs_sim.flight.stitched_simulation import FULL
 from sbs_sim.model.state import SWASHPLATE_NAMES
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.conversions import snapshot_of, to_seconds
@@ -82,7 +84,7 @@ class Cockpit(Component):
         self._pilot = RemotePilot(self)
         self._aircraft: Aircraft | None = None
         self._found: LiveFlight | None = None  # flight of another simulator
-        self._told_wind: tuple[Array, float] | None = None
+        self._told_wind: tuple[Array, float, dict[str, str]] | None = None
         self.failed = False
         for name, kind in MESSAGES.items():
             self.create_subscription(kind, name, lambda data, name=name: self._keep(name, data), NEWEST, raw=True)
@@ -114,7 +116,8 @@ class Cockpit(Component):
             self._wind = wind
             part = event.wind.turbulence_intensity
             turbulence = max(part.x, part.y, part.z)
-            self._told_wind = (wind, turbulence if math.isfinite(turbulence) else 0.0)
+            words = {name: getattr(event.wind, name) for name in SHOWN}
+            self._told_wind = (wind, turbulence if math.isfinite(turbulence) else 0.0, words)
 
     def _on_model(self, model: LinearModel) -> None:
         self._model = model
@@ -250,6 +253,7 @@ def _status(status: SimulationStatus) -> Status:
         status.log,
         f"{lost}{status.log_fault}".strip(),
         tuple(status.warnings),
+        "" if status.model == FULL else status.model,
     )
 
 

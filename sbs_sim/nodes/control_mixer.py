@@ -1,7 +1,7 @@
 """Node `control_mixer`: pilot controls to the swashplates of all rotors (paper section 2.1.1).
 
-Subscribes `controls` and `control_values`, publishes `swashplate` and `diagnostics`. Ranges and rates are those of the
-aircraft file.
+Subscribes `controls`, `control_values` and `excitation`, publishes `swashplate` and `diagnostics`. Ranges and rates are
+those of the aircraft file.
 """
 
 import math
@@ -45,6 +45,7 @@ PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
 }
 CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # as rclpy listens to a clock
+EXCITATION_TIMEOUT = 0.5  # s of simulation time after which an excitation that is not renewed ends
 RAMP_PERIOD = 0.01  # s of wall time between outputs while a swashplate is still on its way
 
 
@@ -72,9 +73,13 @@ class ControlMixer(Component):
         self._health = RecordedPublisher(self, DiagnosticArray, "diagnostics", STATE_QOS, log)
         self._commands = CommandMonitor(self, Controls, "controls", COMMAND_QOS, log)
         self._by_name = CommandMonitor(self, ControlValues, "control_values", COMMAND_QOS, log)
+        self._added_by = CommandMonitor(self, ControlValues, "excitation", COMMAND_QOS, log)
         self._values: NDArray[np.float64] | None = None  # of all controls, as they were commanded last
+        self._added: NDArray[np.float64] | None = None  # to them, by an excitation
+        self._added_at = 0.0  # s
         self.create_subscription(Controls, "controls", self._on_controls, COMMAND_QOS)
         self.create_subscription(ControlValues, "control_values", self._on_values, COMMAND_QOS)
+        self.create_subscription(ControlValues, "excitation", self._on_excitation, COMMAND_QOS)
         if loop is None:
             # The simulator owns time: rates are those of simulated time, and a pause holds the swashplates. Not by
             # use_sim_time, which listens to the one /clock of all namespaces.
@@ -103,13 +108,14 @@ class ControlMixer(Component):
     def _forget(self) -> None:
         """What was commanded is void."""
         self._mixer.forget()
-        self._values = None
+        self._values = self._added = None
 
     def _on_event(self, message: FlightEvent) -> None:
         """What was commanded before the aircraft was put somewhere is void."""
         if message.kind in (FlightEvent.START, FlightEvent.RESET):
             self._commands.restart()
             self._by_name.restart()
+            self._added_by.restart()
             angles = np.array(message.swashplate).reshape(-1, len(SWASHPLATE_NAMES))
             self._forget()
             if len(angles) == len(self._mixer.aircraft.rows):  # else it is another aircraft's
@@ -150,15 +156,46 @@ class ControlMixer(Component):
             monitor.check(message)
             wanted = self._present()
             wanted[indices()] = values
-            self._mixer.set_target(wanted)
-            if self._loop is not None and self._mixer.rests:
-                self._mixer.set_position(self._loop.swashplate())
+            self._aim(wanted, self._added_now())
         except SbsError as error:
             monitor.add(error)
             return
         self._values = wanted
         monitor.accept(message, self._now())
         self._move()
+
+    def _on_excitation(self, message: ControlValues) -> None:
+        """What is added to the controls, from whomever they come; nothing to those that are not named."""
+        self._follow_resets()
+        try:
+            self._added_by.check(message)
+            base, added = self._present(), np.zeros(len(self._mixer.aircraft.controls))
+            added[self._indices(message)] = np.array(message.values)
+            self._aim(base, added)
+        except SbsError as error:
+            self._added_by.add(error)
+            return
+        self._values, self._added, self._added_at = base, added, self._now()
+        self._added_by.accept(message, self._now())
+        self._move()
+
+    def _added_now(self) -> NDArray[np.float64] | float:
+        """What the excitation adds to the controls; nothing once it is too old."""
+        if self._added is not None and self._now() - self._added_at > EXCITATION_TIMEOUT:
+            self._added = None
+        return 0.0 if self._added is None else self._added
+
+    def _aim(self, controls: NDArray[np.float64], added: NDArray[np.float64] | float) -> None:
+        """Set the target; the swashplates begin where they are."""
+        self._mixer.set_target(controls + added)
+        if self._loop is not None and self._mixer.rests:
+            self._mixer.set_position(self._loop.swashplate())
+
+    def _end_excitation(self) -> None:
+        """Back to the controls alone where an excitation has stopped without its end."""
+        if self._added is not None and self._values is not None and np.ndim(self._added_now()) == 0:
+            self._aim(self._values, 0.0)
+            self._move()
 
     def _continue(self) -> None:
         """Move by timer while there is a way to go; a pause or a reset ends it."""
@@ -193,11 +230,13 @@ class ControlMixer(Component):
             self._last_seen[text] = now
 
     def _publish_health(self) -> None:
+        self._follow_resets()
+        self._end_excitation()
         problems = [(DiagnosticStatus.WARN, f"clipped: {text}") for text in self._mixer.saturated]
-        problems += self._commands.problems() + self._by_name.problems()
+        problems += self._commands.problems() + self._by_name.problems() + self._added_by.problems()
         if self._loop is None and not self.count_publishers(self._time.topic_name):
             problems.append((DiagnosticStatus.WARN, f"no simulator: no node publishes {self._time.topic_name}"))
-        values = {"rate_limited": not self._mixer.arrived, **self._commands.values_with(self._by_name)}
+        values = {"rate_limited": not self._mixer.arrived, **self._commands.values_with(self._by_name, self._added_by)}
         message = DiagnosticArray(status=[diagnostic_status("control_mixer", problems, values)])
         message.header.stamp = to_time(self._now())
         self._health.publish(message, self._now())

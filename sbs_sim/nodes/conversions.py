@@ -29,6 +29,8 @@ from sbs_msgs.msg import (
     RotorState,
     RotorStateArray,
     ScheduledControl,
+    SectionState,
+    ShedWake,
     SimulationStatus,
     SurfaceCommand,
     Swashplate,
@@ -50,7 +52,7 @@ from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.gust_table import GustTable
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.state import harmonic_count
-from sbs_sim.model.wind import FIELD, MAX_WIND, RATES, Wind, field_of
+from sbs_sim.model.wind import FIELDS, MAX_WIND, MIN_TURBULENCE_AIRSPEED, RATES, Wind, field_of
 from sbs_sim.recording.recorded_flight import DRIVE_FIELDS
 
 Array = NDArray[np.float64]
@@ -63,7 +65,6 @@ BLADE_FIELDS = ("flap", "flap_rate", "lag", "lag_rate", "blade_flap", "blade_lag
 HALF = math.sqrt(0.5)
 MAX_VALUE = 1e9  # of any number of a flight that can be shown
 DEFAULT_TURBULENCE_LENGTH = 50.0  # m
-MIN_TURBULENCE_AIRSPEED = 1.0  # m/s
 
 
 def to_time(seconds: float) -> Time:
@@ -174,7 +175,7 @@ def prepare_field(request: SetWind.Request) -> None:
     SimulationError
         See `Wind`.
     """
-    if request.turbulence_extent == FIELD:
+    if request.turbulence_extent in FIELDS:
         turbulence = {name: getattr(request, name) for name in GIVEN if name.startswith("turbulence")}
         field_of(
             Wind(
@@ -207,7 +208,7 @@ def _fill_wind(message: WindMessage, wind: Wind) -> None:
         if field.name == "own_gust":
             _fill_own_gust(message, value)
         elif isinstance(value, tuple):
-            _set_vector(getattr(message, field.name), value)
+            set_vector(getattr(message, field.name), value)
         else:
             setattr(message, field.name, value)
 
@@ -217,7 +218,7 @@ def _fill_own_gust(message: WindMessage, table: GustTable | None) -> None:
         message.own_gust_over = table.over
         for position, *velocity in table.rows.tolist():
             message.own_gust.append(GustPoint(position=position))
-            _set_vector(message.own_gust[-1].velocity, velocity)
+            set_vector(message.own_gust[-1].velocity, velocity)
 
 
 def _triple(vector: Vector3 | Point) -> tuple[float, float, float]:
@@ -234,7 +235,8 @@ def _ground_velocity(snapshot: Snapshot) -> Array:
     return rotation_matrix(snapshot.state[S.ATTITUDE : S.VELOCITY]) @ snapshot.state[S.VELOCITY : S.RATES]
 
 
-def _set_vector(target: Vector3 | Point, values: Sequence[float]) -> None:
+def set_vector(target: Vector3 | Point, values: Sequence[float]) -> None:
+    """Set the parts x, y, z."""
     target.x, target.y, target.z = values
 
 
@@ -326,6 +328,9 @@ class StateMessages:
         self.rotors.drives = [DriveState() for _ in aircraft.drives]
         self.rotors.header.frame_id = FRAME_BODY
         self.inflow = InflowArray(rotors=[Inflow() for _ in range(count)])
+        for j, inflow in enumerate(self.inflow.rotors):
+            inflow.wake = [ShedWake() for _ in self._layout.wake_pairs(j)]
+        self.inflow.sections = [SectionState() for _ in range(self._layout.separations)]
         self.inflow.header.frame_id = FRAME_BODY
         self.odom = Odometry(child_frame_id=FRAME_BASE)
         self.odom.header.frame_id = FRAME_ODOM
@@ -340,6 +345,8 @@ class StateMessages:
         if snapshot.contact is not None:
             self._fill_contacts(values, snapshot.contact.tolist())
         self._fill_odom(values)
+        for section, share in zip(self.inflow.sections, values[self._layout.separations_start :], strict=True):
+            section.attached_share = share
         flaps, lags = self._blades.of(snapshot)
         loads = snapshot.loads.tolist()
         azimuth = snapshot.azimuth.tolist()
@@ -352,18 +359,20 @@ class StateMessages:
             rotor.blade_flap, rotor.blade_lag = float64_array(flaps[own]), float64_array(lags[own])
             inflow = self.inflow.rotors[j]
             inflow.uniform, inflow.sine, inflow.cosine = values[self._layout.inflow(j)]
+            for wake, (slow, fast) in zip(inflow.wake, self._layout.wake_pairs(j), strict=True):
+                wake.slow, wake.fast = values[slow], values[fast]
 
     def _fill_state(self, values: list[float], acceleration: list[float]) -> None:
         body = self.state
-        _set_vector(body.position, values[0:3])
+        set_vector(body.position, values[0:3])
         body.attitude.w, body.attitude.x, body.attitude.y, body.attitude.z = values[3:7]
-        _set_vector(body.velocity, values[7:10])
-        _set_vector(body.angular_velocity, values[10:13])
-        _set_vector(body.acceleration, acceleration)
+        set_vector(body.velocity, values[7:10])
+        set_vector(body.angular_velocity, values[10:13])
+        set_vector(body.acceleration, acceleration)
 
     def _fill_contacts(self, values: list[float], rows: list[list[float]]) -> None:
         for i, (contact, row) in enumerate(zip(self.state.contacts, rows, strict=True)):
-            _set_vector(contact.force, row[:DEPTH])
+            set_vector(contact.force, row[:DEPTH])
             contact.depth = row[DEPTH]
             contact.deflection_x, contact.deflection_y = values[self._layout.contact(i)]
 
@@ -382,18 +391,18 @@ class StateMessages:
         rotor.lag_rate = float64_array(state[layout.lag_rate(j)])
         rotor.thrust, rotor.torque = loads[R.THRUST], loads[R.TORQUE]
         rotor.power = loads[R.TORQUE] * rotor.speed
-        _set_vector(rotor.hub.force, loads[R.FORCE : R.FORCE + 3])
-        _set_vector(rotor.hub.torque, loads[R.MOMENT : R.MOMENT + 3])
+        set_vector(rotor.hub.force, loads[R.FORCE : R.FORCE + 3])
+        set_vector(rotor.hub.torque, loads[R.MOMENT : R.MOMENT + 3])
 
     def _fill_odom(self, values: list[float]) -> None:
         """The same motion in ENU and FLU: x east, y north, z up; body x forward, y left, z up."""
         north, east, down = values[0:3]
         pose, twist = self.odom.pose.pose, self.odom.twist.twist
-        _set_vector(pose.position, (east, north, -down))
-        _set_quaternion(pose.orientation, enu_flu_quaternion(values[3:7]))
+        set_vector(pose.position, (east, north, -down))
+        set_quaternion(pose.orientation, enu_flu_quaternion(values[3:7]))
         u, v, w, p, q, r = values[7:13]
-        _set_vector(twist.linear, (u, -v, -w))
-        _set_vector(twist.angular, (p, -q, -r))
+        set_vector(twist.linear, (u, -v, -w))
+        set_vector(twist.angular, (p, -q, -r))
 
 
 def _rotor_at_rest(rotor: Rotor) -> RotorState:
@@ -454,7 +463,16 @@ def snapshot_of(
     if len(rotors.drives) != len(layout.drives):
         drives = f"{len(rotors.drives)} drives, {aircraft.name} has {len(layout.drives)}"
         raise SimulationError(f"the flight has {drives}")
+    wakes = [len(rotor.wake) for rotor in inflow.rotors]
+    expected = [len(layout.wake_pairs(j)) for j in range(count)]
+    if wakes != expected:
+        problem = f"{wakes} coordinates of wakes, {aircraft.name} has {expected}"
+        raise SimulationError(f"the flight has rotors with {problem}")
+    if len(inflow.sections) != layout.separations:
+        problem = f"{len(inflow.sections)} sections with separation, {aircraft.name} has {layout.separations}"
+        raise SimulationError(f"the flight has {problem}")
     state = np.empty(layout.size)
+    state[layout.separations_start :] = [section.attached_share for section in inflow.sections]
     state[: S.BODY_SIZE] = body_array(body)
     for i, drive in enumerate(rotors.drives):
         for name, place in layout.drive(i).items():
@@ -471,6 +489,8 @@ def snapshot_of(
         state[layout.flap(j)], state[layout.flap_rate(j)] = rotor.flap, rotor.flap_rate
         state[layout.lag(j)], state[layout.lag_rate(j)] = rotor.lag, rotor.lag_rate
         state[layout.inflow(j)] = inflow.rotors[j].uniform, inflow.rotors[j].sine, inflow.rotors[j].cosine
+        for wake, pair in zip(inflow.rotors[j].wake, layout.wake_pairs(j), strict=True):
+            state[list(pair)] = wake.slow, wake.fast
         loads[j, R.THRUST], loads[j, R.TORQUE] = rotor.thrust, rotor.torque
         loads[j, R.FORCE : R.FORCE + 3] = _triple(rotor.hub.force)
         loads[j, R.MOMENT : R.MOMENT + 3] = _triple(rotor.hub.torque)
@@ -494,5 +514,6 @@ def snapshot_of(
     )
 
 
-def _set_quaternion(target: Quaternion, values: Sequence[float]) -> None:
+def set_quaternion(target: Quaternion, values: Sequence[float]) -> None:
+    """Set the parts w, x, y, z."""
     target.w, target.x, target.y, target.z = values

@@ -18,7 +18,10 @@ NODES = {
     "recorder_node": ("recorder",),
     "pilot_node": PILOTS,
     "hover_hold": ("hover_hold",),
+    "excite": ("excite",),
+    "frames": ("frames",),
     "joystick": ("joystick",),
+    "ardupilot": ("ardupilot",),
 }
 ROLES = {
     "RecordedPublisher": "publisher",

@@ -11,7 +11,7 @@ from sbs_sim.nodes.signals import INTERRUPTED, when_interrupted
 from sbs_sim.nodes.standard_streams import make_standard_streams_non_blocking
 from sbs_sim.terminal import command_line
 
-OWN_COMMAND_LINE = ("replay", "cockpit")
+OWN_COMMAND_LINE = ("replay", "cockpit", "ardupilot")
 ROS = ("rclpy", "_msgs", "_srvs", "_interfaces", "ament_index_python")
 # The matrices are small: threads of numpy and scipy would gain nothing, and take the cores that the flight needs.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -37,6 +37,16 @@ def hover_hold() -> None:
     _run("hover_hold")
 
 
+def excite() -> None:
+    """Run the executable `excite`."""
+    _run("excite", INTERRUPTED)
+
+
+def frames() -> None:
+    """Run the executable `frames`."""
+    _run("frames")
+
+
 def teleop() -> None:
     """Run the executable `teleop`."""
     _run("teleop")
@@ -57,6 +67,11 @@ def cockpit() -> None:
     _run("cockpit")
 
 
+def ardupilot() -> None:
+    """Run the executable `ardupilot`."""
+    _run("ardupilot")
+
+
 def _run(name: str, interrupted: int = 0) -> None:
     _end_at_once_when_interrupted(interrupted)
     words = sys.argv[1:]
@@ -70,6 +85,10 @@ def _run(name: str, interrupted: int = 0) -> None:
             return
         make_standard_streams_non_blocking()  # before anything takes hold of the standard output
         module = importlib.import_module(f"sbs_sim.nodes.{name}")
+        if own and name not in OWN_COMMAND_LINE:
+            print(importlib.import_module("sbs_sim.nodes.usage").unknown_argument(name, own), file=sys.stderr)
+            sys.exit(2)
+        module.main()
     except ModuleNotFoundError as error:
         if not (error.name or "").partition(".")[0].endswith(ROS):
             raise
@@ -77,10 +96,6 @@ def _run(name: str, interrupted: int = 0) -> None:
             f"{name} needs ROS 2 and the package sbs_msgs: {error}; remedy: source them, or use ./run", file=sys.stderr
         )
         sys.exit(1)
-    if own and name not in OWN_COMMAND_LINE:
-        print(importlib.import_module("sbs_sim.nodes.usage").unknown_argument(name, own), file=sys.stderr)
-        sys.exit(2)
-    module.main()
 
 
 def _end_at_once_when_interrupted(code: int = 0) -> None:

@@ -18,7 +18,7 @@ from sbs_sim.flight.simulation import Simulation
 from sbs_sim.nodes.message_types import definition_file
 from sbs_sim.nodes.recorded_qos import offered
 from sbs_sim.recording import LogWriter, message_definition, type_hash
-from sbs_sim.recording.flight_metadata import attachments, simulation_metadata
+from sbs_sim.recording.flight_metadata import simulation_attachments, simulation_metadata
 from sbs_sim.versions import surroundings, versions
 
 MAX_NAME_LENGTH = 60  # characters of the aircraft's that go into the file's
@@ -56,7 +56,7 @@ class FlightLog:
                 "versions": {**own_versions, **surroundings()},
                 "parameters": {name: repr(value) for name, value in parameters.items()},
             },
-            attachments=attachments(simulation.aircraft),
+            attachments=simulation_attachments(simulation),
             ros_distro=ros_distro(),
         )
 

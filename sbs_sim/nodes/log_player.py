@@ -5,7 +5,7 @@ import math
 import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,14 +16,14 @@ from std_srvs.srv import SetBool
 from sbs_sim.errors import RecordingError, SbsError
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.message_types import fit_of, installed_type
-from sbs_sim.nodes.process import DISCOVERY_TIME, ROS_ERRORS
+from sbs_sim.nodes.process import ROS_ERRORS
 from sbs_sim.nodes.qos import SERVICE_QOS
 from sbs_sim.nodes.recorded_qos import recorded_qos
+from sbs_sim.nodes.signals import DISCOVERY_TIME
 from sbs_sim.recording.cdr import Fit, plain
 from sbs_sim.recording.flight_topics import mixed, several
-from sbs_sim.recording.playback import Playback
+from sbs_sim.recording.playback import Playback, Progress
 
-Progress = Callable[[float, float], None]  # arguments: done, total
 # every node may publish these, in any namespace
 SHARED_TOPICS = frozenset(("rosout", "parameter_events", "diagnostics", "tf", "tf_static"))
 CHECK_PERIOD = 0.05  # s between checks for other publishers

@@ -27,7 +27,7 @@ def installed_type(channel: Channel, schema: Schema | None) -> Any:
     """
     if schema is None or channel.message_encoding != "cdr":
         raise SbsError(f"its messages are no ROS 2 messages but {channel.message_encoding or 'of no known kind'}")
-    kind = _installed(schema.name)
+    kind = installed_class(schema.name)
     if kind is None:
         raise SbsError(f"{schema.name} is not installed")
     if schema.encoding == "ros2msg" and schema.data:
@@ -44,7 +44,7 @@ def fit_of(schema: Schema | None) -> Fit:
     return Fit(parse(name, message_definition(name, definition_file)), short_name(name))
 
 
-def _installed(type_name: str) -> Any:
+def installed_class(type_name: str) -> Any:
     """Class of a message type, None if ROS has none of that name: to import is to execute, so nothing else is."""
     found = MESSAGE_TYPE.fullmatch(type_name)
     if found is None or found["package"] not in get_packages_with_prefixes():

@@ -4,7 +4,7 @@ import array
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as ROSParameter
@@ -14,6 +14,7 @@ from sbs_sim.errors import SbsError
 from sbs_sim.terminal.command_line import suggestion
 
 DEFAULT_GROUND = -100.0  # m
+MAX_PORT = 65535
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,11 @@ def _declare_one(node: Node, name: str, parameter: Parameter, given: dict[str, R
     descriptor = ParameterDescriptor(description=parameter.description, read_only=parameter.fixed)
     allowed = f"allowed is a value like {parameter.default!r}"
     if parameter.least is not None and parameter.most is not None:
-        span = FloatingPointRange(from_value=float(parameter.least), to_value=float(parameter.most), step=0.0)
-        descriptor.floating_point_range = [span]
+        if isinstance(parameter.default, int):
+            descriptor.integer_range = [IntegerRange(from_value=int(parameter.least), to_value=int(parameter.most))]
+        else:
+            span = FloatingPointRange(from_value=float(parameter.least), to_value=float(parameter.most), step=0.0)
+            descriptor.floating_point_range = [span]
         allowed = f"allowed are {parameter.least:g} to {parameter.most:g}"
     if name in given:
         given[name] = ROSParameter(name, value=_as_wanted(given[name].value, parameter.default))

@@ -8,13 +8,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from numpy.typing import NDArray
 
 from sbs_msgs.msg import Controls, FlightEvent, LinearModel
 from sbs_sim.errors import PilotError
 from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.nodes.conversions import (
+    FRAME_BASE,
     FRAME_NED,
     FRAME_ODOM,
     controls_array,
@@ -100,3 +101,28 @@ def to_target(message: PoseStamped) -> tuple[Array, float]:
         allowed = f"allowed are 0 to {math.degrees(MAX_TILT):g} deg, of an upright aircraft"
         raise PilotError(f"orientation is tilted by {math.degrees(tilt):.1f} deg: {allowed}")
     return position, quaternion_to_euler(unit)[0]
+
+
+def to_velocity(message: TwistStamped) -> tuple[float, float, float, float]:
+    """Velocity along and across the heading and down [m/s], and turn rate [rad/s], of a twist in "base_link".
+
+    That has the axes of REP 103, forward, left, up, level along the heading; it turns to the left.
+
+    Raises
+    ------
+    PilotError
+        Another frame, a number that is not finite, or a rate of roll or pitch, which cannot be followed.
+    """
+    frame = message.header.frame_id
+    if frame != FRAME_BASE:
+        raise PilotError(f"frame_id = {frame!r}: allowed is {FRAME_BASE!r}")
+    check_numbers(message.twist, error=PilotError)
+    linear, angular = message.twist.linear, message.twist.angular
+    for name, part in (("linear", linear), ("angular", angular)):
+        for axis in part.get_fields_and_field_types():
+            if not math.isfinite(getattr(part, axis)):
+                raise PilotError(f"{name}.{axis} = {getattr(part, axis)}: allowed are finite numbers")
+    for axis in ("x", "y"):
+        if getattr(angular, axis) != 0.0:
+            raise PilotError(f"angular.{axis} = {getattr(angular, axis):g}: allowed is 0")
+    return linear.x, -linear.y, -linear.z, -angular.z

@@ -25,7 +25,6 @@ from sbs_sim.terminal.progress import show_compiling
 ROS_ERRORS = (rclpy_implementation.RCLError, NameValidationException, ParameterException)
 SHUTDOWN_POLL_PERIOD = 0.2  # s, longest time that a thread takes to see the end
 INTERRUPTION_POLL_PERIOD = 0.1  # s between looks whether there was an interruption
-DISCOVERY_TIME = 1.5  # s in which others that run already are found
 SHUTDOWN_TIMEOUT = 3.0  # s that a thread may take to end
 MIDDLEWARE_TIMEOUT = 15.0  # s that ROS may take to end
 

@@ -17,8 +17,25 @@ class MessageLog(Protocol):
         """Record a serialised message of a simulation time [s]."""
 
 
+class Viewer(Protocol):
+    """A topic that viewers look at; see `sbs_sim.nodes.viewer_topic.ViewerTopic`."""
+
+    def send(self, data: bytes, time: int) -> None:
+        """Send a serialised message of a simulation time [ns]."""
+
+
+class Viewers(Protocol):
+    """Who shows topics; see `sbs_sim.nodes.foxglove_server.FoxgloveServer`."""
+
+    def topic(self, name: str, kind: Any, qos: QoSProfile) -> Viewer:
+        """A topic of a full name, for its publisher to send."""
+
+    def set_time(self, time: int) -> None:
+        """Take the simulation time [ns]."""
+
+
 class RecordedPublisher:
-    """A publisher that also writes what it publishes into the log: messages are serialised once, for both.
+    """A publisher that also writes what it publishes into the log: messages are serialised once, for all.
 
     Parameters
     ----------
@@ -28,12 +45,22 @@ class RecordedPublisher:
     name : str
     qos : QoSProfile
     log : MessageLog, optional
+    viewers : Viewers, optional
     """
 
-    def __init__(self, node: Node, kind: Any, name: str, qos: QoSProfile, log: MessageLog | None = None) -> None:
+    def __init__(
+        self,
+        node: Node,
+        kind: Any,
+        name: str,
+        qos: QoSProfile,
+        log: MessageLog | None = None,
+        viewers: Viewers | None = None,
+    ) -> None:
         self._publisher = node.create_publisher(kind, name, qos)
         self._log = log
         self._channel = log.channel(self._publisher.topic_name, kind, qos, name.lstrip("/")) if log else 0
+        self._viewer = viewers.topic(self._publisher.topic_name, kind, qos) if viewers else None
 
     def publish(self, message: Any, time: float, wait: bool = False, essential: bool = False) -> None:
         """Publish a message of a simulation time [s]; for `wait` and `essential` see `LogWriter.write`."""
@@ -42,6 +69,8 @@ class RecordedPublisher:
     def publish_bytes(self, data: bytes, time: float, wait: bool = False, essential: bool = False) -> None:
         """Publish a message that is serialised."""
         self._publisher.publish(data)
+        if self._viewer is not None:
+            self._viewer.send(data, round(time * 1e9))
         self.record_bytes(data, time, wait, essential)
 
     def publish_again(self, data: bytes) -> None:

@@ -38,7 +38,7 @@ class Rejections:
         """Values for the diagnostics."""
         return {"rejected_messages": self.count, "last_rejection": self._last}
 
-    def values_with(self, other: "Rejections") -> dict[str, Any]:
-        """Values for the diagnostics of two topics together."""
-        latest = max((self, other), key=lambda one: one._at)
-        return {"rejected_messages": self.count + other.count, "last_rejection": latest._last}
+    def values_with(self, *others: "Rejections") -> dict[str, Any]:
+        """Values for the diagnostics of several topics together."""
+        latest = max((self, *others), key=lambda one: one._at)
+        return {"rejected_messages": sum(one.count for one in (self, *others)), "last_rejection": latest._last}

@@ -2,7 +2,7 @@
 
 import dataclasses
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -161,12 +161,15 @@ class RemotePilot:
             return False, "no answer of simulator/set_parameters"
         return response.results[0].successful, response.results[0].reason
 
-    def set_wind(self, velocity: Array, turbulence: float) -> Answer:
-        """Steady wind, NED [m/s], shape (3,), and standard deviation of turbulence in all directions [m/s]."""
+    def set_wind(self, fields: Mapping[str, Any]) -> Answer:
+        """Ask for a wind."""
         request = SetWind.Request()
-        request.velocity.x, request.velocity.y, request.velocity.z = (float(value) for value in velocity)
-        intensity = request.turbulence_intensity
-        intensity.x = intensity.y = intensity.z = float(turbulence)
+        for name, value in fields.items():
+            if isinstance(value, tuple):
+                part = getattr(request, name)
+                part.x, part.y, part.z = value
+            else:
+                setattr(request, name, value)
         return self._ask("set_wind", request)
 
     def record(self, on: bool) -> Answer:

@@ -1,7 +1,8 @@
 """Executable `replay`: publishes a log, verifies it, repairs it, or flies its commands again.
 
 Without an option it publishes the recorded topics with the recorded timing, `/clock` included, and serves `pause`. It
-also reads logs of other writers if their message types are installed.
+also reads logs of other writers if their message types are installed. Only this and flying commands again need ROS,
+which is imported where they begin.
 """
 
 import argparse
@@ -13,20 +14,17 @@ from pathlib import Path
 from typing import Any
 
 from sbs_sim.errors import RecordingError, SbsError
-from sbs_sim.nodes.component import Component
-from sbs_sim.nodes.log_player import LogPlayer, PlayOptions, Progress
-from sbs_sim.nodes.process import DISCOVERY_TIME, own_arguments, run
 from sbs_sim.nodes.signals import (
+    DISCOVERY_TIME,
     INTERRUPTED,
     disregard_interruptions,
     ignore_interruptions,
     note_interruptions,
     when_interrupted,
 )
-from sbs_sim.nodes.what_if import fly_with
 from sbs_sim.output.units import counted
 from sbs_sim.recording import Log, read, recover
-from sbs_sim.recording.playback import Playback
+from sbs_sim.recording.playback import Playback, Progress
 from sbs_sim.recording.recorded_flight import RecordedFlight, complete_until, flight_of
 from sbs_sim.recording.verification import TOLERANCE, Verification, verify
 from sbs_sim.terminal.command_line import Parser
@@ -44,7 +42,7 @@ RECOVERED_SUFFIX = ".recovered.mcap"
 def main(args: list[str] | None = None) -> None:
     """Do with a log what the command line asks for."""
     try:
-        options = _parse(own_arguments(args))
+        options = _parse(_own_arguments(args))
         if options.recover:
             when_interrupted(_interrupt)  # a partly written file is deleted
             sys.exit(_recover(options.file, options.out))
@@ -59,6 +57,15 @@ def main(args: list[str] | None = None) -> None:
     except SbsError as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         sys.exit(1)
+
+
+def _own_arguments(args: list[str] | None) -> list[str]:
+    words = sys.argv if args is None else args
+    if "--ros-args" not in words:
+        return words[1:]
+    from sbs_sim.nodes.process import own_arguments
+
+    return own_arguments(args)
 
 
 def _interrupt(*_: Any) -> None:
@@ -146,6 +153,10 @@ def _check(parser: Parser, options: argparse.Namespace, spelled: tuple[str, str]
 
 def _replay(options: argparse.Namespace) -> int:
     """Play until the end of the log or an interruption."""
+    from sbs_sim.nodes.component import Component
+    from sbs_sim.nodes.log_player import LogPlayer, PlayOptions
+    from sbs_sim.nodes.process import run
+
     ended = threading.Event()
     players: list[LogPlayer] = []
     with Playback(options.file, options.flight) as playback, progress_bar("s") as progress:
@@ -187,7 +198,8 @@ def _verify(path: Path, number: int | None) -> int:
     flight = _flight(path, number)
     with progress_bar("state") as show:
         found = verify(flight, _interruptible(show))
-    print(_verdict(found))
+    model = " of a stitched model" if "model" in flight.options else ""
+    print(f"{_verdict(found)}{model}")
     for title, difference in (("first", found.first), ("largest", found.largest)):
         if difference is not None:
             print(
@@ -236,6 +248,8 @@ def _interruptible(show: Progress | None) -> Progress:
 
 def _fly_with(options: argparse.Namespace) -> int:
     """Fly the commands again, if they are all there."""
+    from sbs_sim.nodes.what_if import fly_with
+
     log = read(options.file).flight(options.flight)
     flight = flight_of(log)
     first = flight.events[0].step  # 0 unless the log was started in mid-flight

@@ -6,6 +6,7 @@ Nothing heavy is imported here: Ctrl-C is obeyed while the compiled model is sti
 import signal
 from collections.abc import Callable
 
+DISCOVERY_TIME = 1.5  # s in which others that run already are found
 INTERRUPTED = 128 + signal.SIGINT  # exit code of a program that was not meant to run until Ctrl-C
 
 

@@ -7,8 +7,8 @@ recorder in the same process.
 
 import math
 import sys
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import SetParametersResult
 from std_srvs.srv import SetBool
@@ -17,28 +17,35 @@ from sbs_msgs.msg import SwashplateArray
 from sbs_msgs.srv import EngineFailure, Reset, SetWind, Step
 from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
-from sbs_sim.analysis.trim import trim
+from sbs_sim.analysis.trim import TWO_BLADES, trim
 from sbs_sim.errors import SbsError, SimulationError, TrimError
 from sbs_sim.flight.contact import state_on_ground
 from sbs_sim.flight.gust_file import read_gust
 from sbs_sim.flight.gust_standards import specified_turbulence
 from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP_DEG, FREE_METHOD, METHOD, METHODS, Simulation
+from sbs_sim.flight.stitched import StitchedModel
+from sbs_sim.flight.stitched_file import load
+from sbs_sim.flight.stitched_simulation import FULL, MODELS, begun, check_aircraft
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import MAX_SPEED, standing_state, trimmed_state
 from sbs_sim.flight.validity import slow_rotors
 from sbs_sim.flight_loop import FlightLoop
-from sbs_sim.model.wind import MAX_WIND, RATES, Wind
+from sbs_sim.model.wind import MAX_WIND, MIN_TURBULENCE_AIRSPEED, RATES, Wind
 from sbs_sim.nodes.command_monitor import CommandMonitor
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.control_mixer import ControlMixer
-from sbs_sim.nodes.conversions import MIN_TURBULENCE_AIRSPEED, point_array, prepare_field, swashplate_array, wind_of
-from sbs_sim.nodes.parameters import DEFAULT_GROUND, Parameter, declare, ground_altitude
+from sbs_sim.nodes.conversions import point_array, prepare_field, swashplate_array, wind_of
+from sbs_sim.nodes.parameters import DEFAULT_GROUND, MAX_PORT, Parameter, declare, ground_altitude
 from sbs_sim.nodes.process import run
 from sbs_sim.nodes.qos import COMMAND_QOS, SERVICE_QOS
 from sbs_sim.nodes.recorder_node import RecorderNode
+from sbs_sim.nodes.sensor_outputs import SENSOR_PARAMETERS, sensor_outputs
 from sbs_sim.nodes.signals import note_interruptions
 from sbs_sim.nodes.simulator_outputs import SimulatorOutputs
 from sbs_sim.output.units import counted
+
+if TYPE_CHECKING:
+    from sbs_sim.nodes.foxglove_server import FoxgloveServer
 
 OFF = "off"
 # How long a thread keeps the interpreter while the flight waits for it [s]; the 5 ms of Python are half a tick.
@@ -88,6 +95,19 @@ PARAMETERS = {
         AUTO,
         f"Integration method: {', '.join(METHODS)}; auto is {METHOD}, or {FREE_METHOD} for an aircraft with drives",
     ),
+    "model": Parameter(
+        FULL,
+        "Model that flies: full, or stitched, which is made of trims and linear models; see stitched_file",
+    ),
+    "stitched_file": Parameter(
+        "", "Stitched model: a file of the command stitch; empty to stitch one at the start, at stitched_airspeeds"
+    ),
+    "stitched_airspeeds": Parameter(
+        [float(speed) for speed in range(-4, 21, 2)], "Airspeeds of a model that is stitched at the start [m/s]"
+    ),
+    "stitched_states": Parameter(
+        "all", "States of a model that is stitched at the start: all, or body, whose rotors and inflow have settled"
+    ),
     "azimuth_step_deg": Parameter(
         AZIMUTH_STEP_DEG, "Largest integration step, as azimuth of the fastest rotor [deg]", 0.01, 45.0
     ),
@@ -112,34 +132,60 @@ PARAMETERS = {
         "off", "Turbulence at the start: off, or light, moderate, severe of MIL-F-8785C at the height of the start"
     ),
     "turbulence_model": Parameter("dryden", "Spectra of the turbulence: dryden or von_karman"),
-    "turbulence_extent": Parameter("point", "Where turbulence acts: point, rates or field, see SetWind"),
+    "turbulence_extent": Parameter("point", "Where turbulence acts: point, rates, field or elements, see SetWind"),
     "turbulence_seed": Parameter(0, "Seed of the turbulence, not negative"),
+    "foxglove": Parameter(
+        False, "Serve the flight to Foxglove and Lichtblick, on this machine alone; needs the package foxglove-sdk"
+    ),
+    "foxglove_port": Parameter(8765, "Port of that server; 0 takes a free one", 0, MAX_PORT),
+    "foxglove_control": Parameter(
+        False,
+        "Let its clients publish what the nodes of this process subscribe, and call their services; any page of a"
+        " browser on this machine is a possible client",
+    ),
     "gust_file": Parameter("", "Own gust at the start: CSV file, see SetWind; empty for none"),
+    "simulation_interfaces": Parameter(
+        False, "Offer the services of the package simulation_interfaces, which must be installed"
+    ),
+    **SENSOR_PARAMETERS,
 }
 
 
 class Simulator(Component):
-    """See the module. The flight itself begins with `begin`."""
+    """See the module. The flight itself begins with `begin`.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    parameters : dict of str to Parameter
+        Those of `PARAMETERS`, and what else a simulator with another clock has.
+    """
+
+    def __init__(self, parameters: dict[str, Parameter] = PARAMETERS) -> None:
         super().__init__("simulator")
-        self._values = values = declare(self, PARAMETERS)
+        self._values = values = declare(self, parameters)
         self.components = checked_components(values["components"])
         if "recorder" not in self.components and values["record"] not in ("", OFF):
             raise SbsError(f"parameter record = {values['record']!r}: not allowed without the component recorder")
-        self.aircraft = Aircraft.load(values["aircraft"])
+        self.viewers = foxglove_server(values)
+        self.aircraft = self._loaded(values)
+        self._stitched = stitched_model(values, self.aircraft)
         self._fidelity = {"lead_lag": values["lead_lag"], "cyclic_inflow": values["cyclic_inflow"]}
         simulation = self._start(values)
-        self.loop = FlightLoop(simulation, values["real_time_factor"], values["command_timeout"])
+        self.loop = self._loop_of(simulation, values)
         self.log = RecorderNode(simulation, self.loop, values) if "recorder" in self.components else None
         self._commands = CommandMonitor(self, SwashplateArray, "swashplate", COMMAND_QOS, self.log)
-        self._outputs = SimulatorOutputs(self, self.loop, self._commands, self.log)
+        sensors = sensor_outputs(self, simulation, self.loop, values, self.log)
+        self._outputs = SimulatorOutputs(self, self.loop, self._commands, self.log, sensors, self.viewers)
         self.create_subscription(SwashplateArray, "swashplate", self._on_swashplate, COMMAND_QOS)
         self.create_service(SetBool, "pause", self._on_pause, qos_profile=SERVICE_QOS)
         self.create_service(Step, "step", self._on_step, qos_profile=SERVICE_QOS)
         self.create_service(Reset, "reset", self._on_reset, qos_profile=SERVICE_QOS)
         self.create_service(SetWind, "set_wind", self._on_set_wind, qos_profile=SERVICE_QOS)
         self.create_service(EngineFailure, "engine_failure", self._on_engine_failure, qos_profile=SERVICE_QOS)
+        if values["simulation_interfaces"]:
+            from sbs_sim.nodes.simulation_services import SimulationServices  # here: most do without
+
+            SimulationServices(self, simulation, self.loop)
         self.add_on_set_parameters_callback(self._on_parameters)
 
     def begin(self) -> None:
@@ -155,6 +201,16 @@ class Simulator(Component):
             self.get_logger().info(f"recording {self.log.path}")
         self.loop.start()
 
+    def _loaded(self, values: dict[str, Any]) -> Aircraft:
+        return Aircraft.load(values["aircraft"])
+
+    def _loop_of(self, simulation: Simulation, values: dict[str, Any]) -> FlightLoop:
+        return FlightLoop(simulation, values["real_time_factor"], values["command_timeout"])
+
+    def _tick(self, values: dict[str, Any]) -> float:
+        """Length of a tick [s]."""
+        return 1.0 / float(values["publish_rate"])
+
     def _start(self, values: dict[str, Any]) -> Simulation:
         """Simulation in trimmed flight at the condition that the parameters name, or of rotors on a stand."""
         if len(values["wind"]) != 3:
@@ -165,17 +221,11 @@ class Simulator(Component):
         condition, position = [values[name] for name in CONDITION], (0.0, 0.0, -values["altitude"])
         start = values["heading"], wind.velocity_at(height), values["rotor_speed"]
         state, controls = self._beginning(condition, position, *start, values["on_ground"])
-        simulation = Simulation(
-            self.aircraft,
-            state,
-            self.aircraft.mix(controls),
-            tick=1.0 / values["publish_rate"],
-            method=values["method"],
-            azimuth_step=math.radians(values["azimuth_step_deg"]),
-            wind=wind,
-            ground_altitude=self._ground,
-            **self._fidelity,
-        )
+        options: dict[str, Any] = {"tick": self._tick(values), "wind": wind, "ground_altitude": self._ground}
+        if self._stitched is None:
+            options |= {"method": values["method"], "azimuth_step": math.radians(values["azimuth_step_deg"])}
+            options |= self._fidelity
+        simulation = begun(self.aircraft, self._stitched, state, self.aircraft.mix(controls), **options)
         shown = ", ".join(
             f"{control.name} {control.shown(value):.3f} {control.shown_unit}"
             for control, value in zip(self.aircraft.controls, controls.tolist(), strict=True)
@@ -183,7 +233,8 @@ class Simulator(Component):
         begins = (
             "on its stand" if self.aircraft.body.is_stand else "on the ground" if values["on_ground"] else "trimmed"
         )
-        self.get_logger().info(f"{self.aircraft.name} {begins} with {shown}, flies by {simulation.options['method']}")
+        by = simulation.options["method"] if self._stitched is None else stitched_words(self._stitched)
+        self.get_logger().info(f"{self.aircraft.name} {begins} with {shown}, flies by {by}")
         return simulation
 
     def _beginning(
@@ -220,11 +271,17 @@ class Simulator(Component):
 
     def _trim(self, airspeed: float, climb_rate: float, sideslip: float, turn_rate: float) -> TrimPoint:
         """Trim that can be flown: every control within its limits, and no rotor that hardly turns."""
+        if self._stitched is not None:
+            low, high = float(self._stitched.airspeeds[0]), float(self._stitched.airspeeds[-1])
+            checks.number("airspeed of the stitched model", airspeed, low, high, "m/s", SimulationError)
         point = trim(self.aircraft, airspeed, climb_rate, sideslip, turn_rate, **self._fidelity)
         if point.beyond_limits:
             raise TrimError("this flight needs " + "; ".join(point.beyond_limits))
         if slow := [rotor.name for rotor, _ in slow_rotors(self.aircraft, point.rotor_speed)]:
             raise TrimError(f"in this flight nothing turns {', '.join(slow)} fast enough to hold its blades")
+        for line in point.warnings:
+            if line.startswith(TWO_BLADES):  # the flight does not begin as it goes on; the others are in `status`
+                self.get_logger().warning(f"begins with a trim in the mean: {line}")
         return point
 
     # ----------------------------------------------------------------------------------------------------- inputs
@@ -305,6 +362,66 @@ class Simulator(Component):
                 self.get_logger().error(str(error))
 
 
+def foxglove_server(values: dict[str, Any]) -> "FoxgloveServer | None":
+    """Server for viewers, if one is wanted.
+
+    Raises
+    ------
+    SbsError
+        Its package is missing, or it cannot serve there.
+    """
+    if not values["foxglove"]:
+        return None
+    try:
+        from sbs_sim.nodes.foxglove_server import FoxgloveServer  # here: its package is needed for this only
+    except ModuleNotFoundError as error:
+        if error.name != "foxglove":
+            raise
+        raise SbsError("parameter foxglove = true: needs the package foxglove-sdk: pip install foxglove-sdk") from None
+    return FoxgloveServer(values["foxglove_port"], values["foxglove_control"])
+
+
+def stitched_model(values: dict[str, Any], aircraft: Aircraft) -> StitchedModel | None:
+    """The stitched model that flies, or None for the full one.
+
+    Raises
+    ------
+    SbsError
+        A parameter out of range, a file that cannot be read, a model of another aircraft, an aircraft that a stitched
+        model cannot describe.
+    """
+    checks.choice("parameter model", values["model"], MODELS, SimulationError)
+    if values["model"] == FULL:
+        if values["stitched_file"]:
+            raise SimulationError(
+                f"parameter stitched_file = {values['stitched_file']!r}: allowed with model = stitched"
+            )
+        return None
+    if values["method"] not in (AUTO, "rk4"):
+        raise SimulationError(f"parameter method = {values['method']!r}: allowed with model = stitched are {AUTO}, rk4")
+    if values["stitched_file"]:
+        model = load(values["stitched_file"])
+        check_aircraft(model, aircraft)
+        return model
+    from sbs_sim.analysis.stitched import stitch  # here: few need it
+
+    return stitch(
+        aircraft,
+        list(values["stitched_airspeeds"]),
+        states=values["stitched_states"],
+        lead_lag=values["lead_lag"],
+        cyclic_inflow=values["cyclic_inflow"],
+    )
+
+
+def stitched_words(model: StitchedModel) -> str:
+    """What a stitched model is, in a few words."""
+    return (
+        f"a stitched model of {len(model.state_names)} states, {model.airspeeds[0]:g} to {model.airspeeds[-1]:g} m/s:"
+        " without vibration, engines and ground effect"
+    )
+
+
 def check_reset(request: Reset.Request) -> None:
     """Raise SimulationError for a request with a part that would not be used."""
     if not request.from_state:
@@ -360,8 +477,9 @@ def checked_components(names: list[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _nodes(interruptions: list[int]) -> list[Component]:
-    simulator = Simulator()
+def nodes_of(make: Callable[[], Simulator], interruptions: list[int]) -> list[Component]:
+    """A simulator and the nodes that fly with it in its process, in flight."""
+    simulator = make()
     nodes: list[Component] = [simulator]
     if "control_mixer" in simulator.components:
         nodes.append(ControlMixer(simulator.loop, simulator.log))
@@ -372,6 +490,9 @@ def _nodes(interruptions: list[int]) -> list[Component]:
         nodes.append(Analysis(simulator.loop, simulator.log))
     if simulator.log is not None:
         nodes.append(simulator.log)
+    if simulator.viewers is not None:
+        simulator.viewers.serve(nodes)
+        nodes.append(simulator.viewers)
     sys.setswitchinterval(SWITCH_INTERVAL)
     note_interruptions(interruptions)  # from now on a log is closed in order
     simulator.begin()  # last: what is loaded meanwhile would make it miss deadlines
@@ -381,4 +502,4 @@ def _nodes(interruptions: list[int]) -> list[Component]:
 def main(args: list[str] | None = None) -> None:
     """Fly until interrupted."""
     interruptions: list[int] = []
-    sys.exit(run(lambda: _nodes(interruptions), args, first="simulator", interruptions=interruptions))
+    sys.exit(run(lambda: nodes_of(Simulator, interruptions), args, first="simulator", interruptions=interruptions))

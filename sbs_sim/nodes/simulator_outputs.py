@@ -27,9 +27,10 @@ from sbs_sim.nodes.diagnostics import DIAGNOSTICS_PERIOD, diagnostic_status
 from sbs_sim.nodes.late_subscribers import LateSubscribers
 from sbs_sim.nodes.other_publishers import OtherPublishers
 from sbs_sim.nodes.qos import EVENT_QOS, STATE_QOS
-from sbs_sim.nodes.recorded_publisher import RecordedPublisher
+from sbs_sim.nodes.recorded_publisher import RecordedPublisher, Viewers
 from sbs_sim.nodes.recorder_node import RecorderNode
 from sbs_sim.nodes.rejections import WARNING_PERIOD
+from sbs_sim.nodes.sensor_outputs import SensorOutputs
 from sbs_sim.nodes.state_bytes import StatusBytes, states_of
 from sbs_sim.output.units import counted
 
@@ -49,10 +50,23 @@ class SimulatorOutputs:
         The commands of the simulator.
     log : RecorderNode, optional
         Where everything that is published is recorded.
+    sensors : SensorOutputs, optional
+        None if all are off.
+    viewers : Viewers, optional
+        Who shows it.
     """
 
-    def __init__(self, node: Node, loop: FlightLoop, commands: CommandMonitor, log: RecorderNode | None = None) -> None:
+    def __init__(
+        self,
+        node: Node,
+        loop: FlightLoop,
+        commands: CommandMonitor,
+        log: RecorderNode | None = None,
+        sensors: SensorOutputs | None = None,
+        viewers: Viewers | None = None,
+    ) -> None:
         self._node, self._loop, self._commands, self._log = node, loop, commands, log
+        self._sensors, self._viewers = sensors, viewers
         self._reported_log_fault = ""
         self._started = False  # the start of the flight has been published
         self._states = states = states_of(loop.aircraft, node.get_logger().warning)
@@ -63,14 +77,18 @@ class SimulatorOutputs:
         self._last_content: tuple[Any, ...] = ()  # status content that may change while the aircraft does not move
         self._last_publication = -math.inf
         self._of_snapshots = (
-            (RecordedPublisher(node, BodyState, "state", STATE_QOS, log), partial(states.data, "state")),
-            (RecordedPublisher(node, RotorStateArray, "rotors", STATE_QOS, log), partial(states.data, "rotors")),
-            (RecordedPublisher(node, InflowArray, "inflow", STATE_QOS, log), partial(states.data, "inflow")),
-            (RecordedPublisher(node, Odometry, "odom", STATE_QOS, log), partial(states.data, "odom")),
+            (RecordedPublisher(node, BodyState, "state", STATE_QOS, log, viewers), partial(states.data, "state")),
+            (
+                RecordedPublisher(node, RotorStateArray, "rotors", STATE_QOS, log, viewers),
+                partial(states.data, "rotors"),
+            ),
+            (RecordedPublisher(node, InflowArray, "inflow", STATE_QOS, log, viewers), partial(states.data, "inflow")),
+            (RecordedPublisher(node, Odometry, "odom", STATE_QOS, log, viewers), partial(states.data, "odom")),
         )
-        self._clock = RecordedPublisher(node, Clock, "clock", STATE_QOS, log)
-        self._events = RecordedPublisher(node, FlightEvent, "events", EVENT_QOS, log)
-        self._status_topic = RecordedPublisher(node, SimulationStatus, "status", STATE_QOS, log)
+        self._clock = RecordedPublisher(node, Clock, "clock", STATE_QOS, log, viewers)
+        self._events = RecordedPublisher(node, FlightEvent, "events", EVENT_QOS, log, viewers)
+        self._status_topic = RecordedPublisher(node, SimulationStatus, "status", STATE_QOS, log, viewers)
+        # not for viewers: other nodes publish it too, and they hear all of them
         self._health = RecordedPublisher(node, DiagnosticArray, "diagnostics", STATE_QOS, log)
         own = (self._clock, *(topic for topic, _ in self._of_snapshots), self._events, self._status_topic)
         self._other_publishers, self._last_other_publishers = OtherPublishers(node, [topic.name for topic in own]), ""
@@ -117,6 +135,8 @@ class SimulatorOutputs:
         # as fast as possible, the flight waits for the log rather than lose messages
         now, wait = report.time, self._loop.pace == 0.0
         self._clock_message.clock = to_time(now)
+        if self._viewers is not None:
+            self._viewers.set_time(round(now * 1e9))
         self._clock.publish(self._clock_message, now, wait)
         for event in report.events:
             self._publish_event(event, now, wait)
@@ -124,6 +144,8 @@ class SimulatorOutputs:
             self._states.fill(report.snapshot)
             for topic, data in self._of_snapshots:
                 (topic.record_bytes if report.repeated else topic.publish_bytes)(data(), now, wait)
+            if self._sensors is not None:
+                self._sensors.publish(report.snapshot, wait)
         self._status_topic.publish_bytes(self._status_bytes.data(self._status), now, wait)
 
     def _publish_event(self, event: Event, now: float, wait: bool) -> None:
@@ -160,8 +182,11 @@ class SimulatorOutputs:
         status.dropped_messages = report.dropped
         status.rejected_messages = self._commands.count
         status.fault = report.fault
+        status.model = self._loop.model
         if report.snapshot is not None:
             fill_working_states(status, self._loop.aircraft, report.snapshot)
+            if (model := self._loop.stitched) is not None:
+                status.warnings = model.warnings_at(report.snapshot.state, report.snapshot.wind)
         if self._log is not None:
             status.log, status.log_dropped, status.log_fault = self._log.path, self._log.dropped, self._log.fault
 
@@ -216,6 +241,7 @@ class SimulatorOutputs:
             "real_time_factor": f"{report.real_time_factor:.4f}",
             "missed_deadlines": report.missed_deadlines,
             "method": self._loop.method,
+            "model": self._loop.model,
             **self._commands.values(),
         }
         message = DiagnosticArray(status=[diagnostic_status("simulator", problems, values)])

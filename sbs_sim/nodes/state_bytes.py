@@ -170,6 +170,11 @@ class StateBytes:
         for j in range(self._count):
             for i, name in enumerate(("uniform", "sine", "cosine")):
                 yield f"rotors[{j}].{name}", (aircraft.layout.inflow(j).start + i, 1.0)
+            for i, (slow, fast) in enumerate(aircraft.layout.wake_pairs(j)):
+                yield f"rotors[{j}].wake[{i}].slow", (slow, 1.0)
+                yield f"rotors[{j}].wake[{i}].fast", (fast, 1.0)
+        for i in range(aircraft.layout.separations):
+            yield f"sections[{i}].attached_share", (aircraft.layout.separations_start + i, 1.0)
 
     def _odom_fields(self, _: Aircraft) -> Iterator[tuple[str, tuple[int, float]]]:
         """NED to ENU, FRD to FLU, as `StateMessages` has it."""
@@ -241,7 +246,7 @@ class StatusBytes:
         """The bytes of a status."""
         if self._refused:
             return bytes(serialize_message(status))
-        texts = status.fault, status.log, status.log_fault, *status.warnings, len(status.working_states)
+        texts = status.fault, status.log, status.log_fault, status.model, *status.warnings, len(status.working_states)
         template = self._known.get(texts)
         if template is None:
             try:

@@ -13,15 +13,21 @@ from sbs_sim.terminal import command_line
 
 WIDTH = 100
 # Nodes that an executable starts in its process.
-WITH = {"simulator": ("simulator", "control_mixer", "analysis", "recorder")}
+WITH = {
+    "simulator": ("simulator", "control_mixer", "analysis", "recorder"),
+    "ardupilot": ("simulator", "analysis", "recorder", "ardupilot"),
+}
 EXAMPLES = {
     "simulator": "simulator --ros-args -p airspeed:=15.0 -p record:=off",
     "control_mixer": "control_mixer --ros-args -p aircraft:=/path/to/my.yaml",
     "analysis": "analysis --ros-args -p aircraft:=sbs_paper",
     "hover_hold": "hover_hold --ros-args -p position_limit:=0.25",
+    "excite": "excite --ros-args -p controls:=[longitudinal_cyclic] -p amplitude_deg:=0.5 -p low:=1.0 -p high:=20.0",
+    "frames": "frames --ros-args -p aircraft:=uh60a_tm85890 -p rate:=30.0",
     "teleop": "teleop --ros-args -p cyclic_deg:=1.5",
     "joystick": "joystick --ros-args -p pad:=xbox",
     "cockpit": "cockpit --port 8081 --ros-args -p airspeed:=15.0",
+    "ardupilot": "ardupilot --ros-args -p wind:=[4.0,0.0,0.0]",
     "replay": "replay bags/hover_step.mcap --rate 0.5",
 }
 TITLES = {"publisher": "publishes", "subscription": "subscribes", "service": "serves", "action": "serves, as an action"}

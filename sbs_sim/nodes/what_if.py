@@ -14,7 +14,7 @@ from rosgraph_msgs.msg import Clock
 from sbs_msgs.msg import BodyState, FlightEvent, InflowArray, RotorStateArray
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.errors import RecordingError, SbsError
-from sbs_sim.flight.refly import refly, started
+from sbs_sim.flight.refly import refly, rescaled, started
 from sbs_sim.nodes.conversions import StateMessages, event_message, to_time
 from sbs_sim.nodes.flight_log import FlightLog
 from sbs_sim.nodes.qos import EVENT_QOS, STATE_QOS
@@ -54,13 +54,10 @@ def fly_with(
         A change that is not possible, a log that cannot be written.
     """
     aircraft = changed(flight.aircraft, changes)
-    # rotors of another speed have another step: what acted acts at the same time
+    # rotors of another speed have another step
     step_size = started(aircraft, flight.events, **flight.options).step_size
     shorter = flight.step_size / step_size
-    events = tuple(
-        replace(event, step=round(event.step * shorter), wind_step=round(event.wind_step * shorter))
-        for event in flight.events
-    )
+    events = rescaled(flight.events, shorter)
     simulation = started(aircraft, events, **flight.options)
     log = FlightLog(str(output), simulation, {"with": list(changes)})
     try:

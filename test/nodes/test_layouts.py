@@ -9,14 +9,19 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap.records import Schema
 from ruamel.yaml import YAML
 
 from sbs_sim.config_file import config_folder
 from sbs_sim.recording import read
+from sbs_sim.recording.cdr import decode
+from sbs_sim.recording.definitions import parse, short_name
+from sbs_sim.recording.degrees import Degrees
 
 ROOT = Path(__file__).resolve().parents[2]
 LAYOUTS = config_folder() / "layouts"
-MODIFIERS = {"@rad2deg", "@negative"}  # those of Foxglove's message paths that are used
+MODIFIERS = {"@rad2deg"}  # those of Foxglove's message paths that are used
 
 
 @pytest.fixture(scope="module")
@@ -24,12 +29,12 @@ def log():
     return read(ROOT / "bags" / "hover_step.mcap")
 
 
-def foxglove():
-    return json.loads((LAYOUTS / "foxglove.json").read_text())
+def foxglove(name="foxglove"):
+    return json.loads((LAYOUTS / f"{name}.json").read_text())
 
 
-def foxglove_paths():
-    panels = foxglove()["configById"].values()
+def foxglove_paths(name="foxglove"):
+    panels = foxglove(name)["configById"].values()
     return [path["value"] for panel in panels for path in panel.get("paths", [])]
 
 
@@ -66,6 +71,32 @@ def test_every_path_of_foxglove_is_in_the_log(log):
         check(log, topic, ".".join(fields))
 
 
+def test_every_path_of_lichtblick_is_of_a_topic_or_of_one_that_the_server_makes_in_degrees(log):
+    in_degrees = {}
+    with (ROOT / "bags" / "hover_step.mcap").open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            if f"{channel.topic}_deg" not in in_degrees:
+                degrees = Degrees(schema.name, schema.data.decode())
+                made = Schema(0, degrees.definition.encode(), "ros2msg", degrees.type_name)
+                fields = decode(made, *parsed(made), [degrees.convert(message.data)])
+                in_degrees[f"{channel.topic}_deg"] = fields
+    paths = foxglove_paths("lichtblick")
+    assert len(paths) == len(foxglove_paths())
+    assert sum("_deg" in path for path in paths) == sum("@rad2deg" in path for path in foxglove_paths())
+    for path in paths:
+        topic, _, field = path.partition(".")
+        assert "@" not in path
+        if topic in in_degrees:
+            assert re.sub(r"\[\d+\]$", "", field) in in_degrees[topic]
+        else:
+            check(log, topic, field)
+
+
+def parsed(schema):
+    """Definitions of a schema, and the name of its type in them."""
+    return parse(schema.name, schema.data.decode()), short_name(schema.name)
+
+
 def test_every_curve_of_plotjuggler_is_in_the_log(log):
     curves = plotjuggler_curves()
     assert len(curves) > 40
@@ -82,8 +113,9 @@ def test_topics_of_panels_are_those_of_the_log(log):
     assert topics <= {f"/{topic.lstrip('/')}" for topic in log.topics}
 
 
-def test_every_panel_is_shown_once():
-    layout = foxglove()
+@pytest.mark.parametrize("name", ["foxglove", "lichtblick"])
+def test_every_panel_is_shown_once(name):
+    layout = foxglove(name)
 
     def leaves(node):
         if isinstance(node, str):
@@ -112,6 +144,7 @@ def test_rviz_shows_topics_of_the_simulator_and_sends_targets(log):
     by_class = {entry["Class"].rpartition("/")[2]: entry for entry in config["Displays"] + config["Tools"]}
     assert by_class["Odometry"]["Topic"]["Value"] == "/odom"
     assert by_class["SetGoal"]["Topic"]["Value"] == by_class["Pose"]["Topic"]["Value"] == "/target"
+    assert by_class["RobotModel"]["Description Topic"]["Value"] == "/robot_description"  # of the node frames
     assert config["Global Options"]["Fixed Frame"] == log["odom"]["header.frame_id"][0]
     assert log["odom"].type == "nav_msgs/msg/Odometry"
 
@@ -122,5 +155,5 @@ def test_the_layouts_are_those_of_their_script(tmp_path):
         f"make_layouts.FOLDER = pathlib.Path({str(tmp_path)!r}); make_layouts.main()"
     )
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, timeout=60)
-    for name in ("foxglove.json", "plotjuggler.xml"):
+    for name in ("foxglove.json", "lichtblick.json", "plotjuggler.xml"):
         assert (tmp_path / name).read_text() == (LAYOUTS / name).read_text()

@@ -5,8 +5,9 @@
 
 The model's bits are the same for all of them (`compare_bits.py`), so what fails here hangs on a library, or is a
 fault of ours. A target is a name that LLVM knows. `NUMBA_CPU_FEATURES` is empty then: the name alone would keep the
-features of this machine, and the suite would pass for the wrong reason. This machine must be able to execute what is
-compiled. The exit code is 1 if a test fails.
+features of this machine, and the suite would pass for the wrong reason. The kernels of the target are compiled first,
+as the build compiles those of this machine: no flight of a test then waits for the compiler. This machine must be able
+to execute what is compiled. The exit code is 1 if a test fails.
 """
 
 import argparse
@@ -30,6 +31,7 @@ def main() -> int:
     for target in options.targets:
         environment = {**os.environ, "NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}
         begin = time.monotonic()
+        subprocess.run([sys.executable, "-m", "sbs_sim.warm_up"], cwd=ROOT, env=environment, check=True)
         command = [sys.executable, "-m", "pytest", "-q", *options.arguments]
         found = subprocess.run(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True, check=False)
         last = found.stdout.rstrip().rpartition("\n")[2]

@@ -1,0 +1,88 @@
+"""The node `excite`: a real flight with chirps, and what `identify` finds in its log."""
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy")
+
+from ros_harness import DOMAINS, world  # noqa: E402
+
+from sbs_msgs.msg import ControlValues, SwashplateArray  # noqa: E402
+from sbs_sim import Aircraft, linearize  # noqa: E402
+from sbs_sim.analysis.identification import identify  # noqa: E402
+from sbs_sim.errors import IdentificationError  # noqa: E402
+from sbs_sim.nodes.excite import PARAMETERS, excitation_parts  # noqa: E402
+from sbs_sim.recording import read  # noqa: E402
+from sbs_sim.recording.flight_signals import signals_of_log  # noqa: E402
+
+NAME = "longitudinal_cyclic"
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    """Path of the log of a flight with a chirp and without a controller."""
+    folder = tmp_path_factory.mktemp("excite")
+    with world(next(DOMAINS), folder) as made:
+        made.client.watch("excitation", ControlValues)
+        made.client.watch("swashplate", SwashplateArray)
+        chirp = {"low": 5.0, "high": 25.0, "duration": 6.0, "pause": 0.5, "amplitude_deg": 0.3}
+        excite = made.start("excite", controls=f"[{NAME}]", **chirp)
+        # nobody holds the trim, so the flight begins when all else has, however slow the machine is
+        made.client.until(lambda: "waiting for states" in excite.output, "the node")
+        # slowly: what a busy machine delays by chance is then a small part of a period of the chirp
+        simulator = made.start("simulator", record=folder / "flight.mcap", real_time_factor=0.5)
+        assert excite.wait() == 0, excite.output
+        assert "excitation has ended" in excite.output
+        assert simulator.interrupt() == 0, simulator.output
+    return folder / "flight.mcap"
+
+
+def test_the_log_has_the_excitation_and_the_controls_follow_it(flight):
+    signals, _ = signals_of_log(read(flight))
+    assert signals.excitations == (f"excitation_{NAME}",)
+    added, moved = signals.values[f"excitation_{NAME}"], signals.values[NAME]
+    assert np.abs(added).max() == pytest.approx(np.radians(0.3), rel=0.02)
+    assert moved[-1] == pytest.approx(moved[0], abs=1e-9)
+    shift = np.argmax(np.correlate(moved - moved[0], added, "full")) - (len(added) - 1)
+    assert abs(shift) <= 2  # ticks: messages take their time
+    assert signals.values["collective"] == pytest.approx(signals.values["collective"][0], abs=1e-9)
+
+
+def test_what_is_identified_in_the_log_is_the_linear_model(flight):
+    """Within twice the printed random error, or 0.5 dB and 3 deg, while the aircraft is still near its trim."""
+    log = read(flight)
+    whole, flown = signals_of_log(log)
+    excited = whole.begin + whole.tick * np.flatnonzero(whole.values[f"excitation_{NAME}"])
+    signals, _ = signals_of_log(log, excited[0] - 0.3, excited[-1] + 0.2)
+    asked = np.geomspace(9.0, 20.0, 6)
+    found = identify(signals, [NAME], ["q"], references=[f"excitation_{NAME}"], frequencies=asked)[NAME, "q"]
+    gain, phase = found.departure(linearize(flown.aircraft).frequency_response(NAME, "q", asked))
+    assert found.valid.all()
+    assert np.all(np.abs(gain) <= np.maximum(2.0 * found.gain_error_db, 0.5))
+    assert np.all(np.abs(phase) <= np.maximum(2.0 * found.phase_error_deg, 3.0))
+    assert found.gain_error_db.max() < 1.5
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"signal": "step"}, "parameter signal = 'step': allowed are chirp, multisine"),
+        ({"controls": ["pedal"]}, "parameter controls = \\['pedal'\\]: allowed are collective"),
+        ({"controls": [NAME, NAME]}, "each once"),
+        ({"duration": 1.0}, "duration = 1.0: allowed are 6.28319 to 3600 s"),
+        ({"signal": "multisine", "period": 0.3}, "hold 0 harmonics for 1 control"),
+    ],
+)
+def test_what_cannot_be_excited_is_refused(change, text):
+    settings = {name: parameter.default for name, parameter in PARAMETERS.items()} | change
+    with pytest.raises(IdentificationError, match=text):
+        excitation_parts(Aircraft.load("sbs"), settings)
+
+
+def test_chirps_follow_one_another_and_multisines_go_together():
+    settings = {name: parameter.default for name, parameter in PARAMETERS.items()} | {"controls": [NAME, "collective"]}
+    aircraft = Aircraft.load("sbs")
+    first, second = excitation_parts(aircraft, settings)
+    assert first.end + settings["pause"] == pytest.approx(second.begin)
+    together = excitation_parts(aircraft, settings | {"signal": "multisine"})
+    assert together[0].begin == together[1].begin

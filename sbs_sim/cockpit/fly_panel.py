@@ -2,8 +2,8 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from viser import ViserServer
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.analysis.control_effects import ControlEffect
+from sbs_sim.cockpit.air_panel import AirPanel
 from sbs_sim.cockpit.control_labels import axes_of, control_label
 from sbs_sim.cockpit.panel_tools import REAL_TIME_FACTORS, Answer, by_user, notify
 from sbs_sim.cockpit.readouts import condition_here
@@ -46,7 +47,7 @@ FIRST_HINT = (
     f" {TURBULENCE} disturbs it."
 )
 LOG_SHOWN = "A log is shown: the live flight cannot be controlled from here."
-GONE = "The simulator has ended."
+GONE = "No message of the simulator: what is below does nothing."
 
 
 class Pilot(Protocol):
@@ -73,8 +74,8 @@ class Pilot(Protocol):
     def set_pace(self, factor: float) -> Answer:
         """Simulation time over wall time; 0 is as fast as possible."""
 
-    def set_wind(self, velocity: Array, turbulence: float) -> Answer:
-        """Steady wind, NED [m/s], shape (3,), and standard deviation of turbulence in all directions [m/s]."""
+    def set_wind(self, fields: Mapping[str, Any]) -> Answer:
+        """Blow as the service `set_wind` does with these fields, see `AirPanel.fields`."""
 
     def record(self, on: bool) -> Answer:
         """Begin a log in the default folder, or end the present one."""
@@ -125,7 +126,11 @@ class FlyPanel:
             self._controls = server.gui.add_folder("Controls [deg]")
             self._add_analysis()
             self._add_reset()
-            self._add_wind()
+            self._air = AirPanel(server, self._on_wind, lambda text: self._say("Own gust", (False, text)))
+            self._record = server.gui.add_button(
+                RECORD, hint="starts a log of the flight from now on, or ends the current one"
+            )
+            self._record.on_click(lambda _: self._on_record())
         self._add_controls()
 
     def use(self, aircraft: Aircraft, effects: Sequence[ControlEffect], pace: float = 1.0) -> None:
@@ -156,7 +161,8 @@ class FlyPanel:
         """Let the flight be steered if there is nothing to note; else say that instead."""
         if self._steerable != (not note) or (note and self._note.content != line(note)):
             self._steerable = not note
-            self._note.content, self._note.visible, self._all.visible = line(note), bool(note), not note
+            self._note.content, self._note.visible = line(note), bool(note)
+            self._all.visible = note != LOG_SHOWN  # not for a flight that only hesitates: its open folders would close
             self._back.visible = note == LOG_SHOWN
 
     # ------------------------------------------------------------------------------------------------------- parts
@@ -215,18 +221,6 @@ class FlyPanel:
         buttons = gui.add_button_group("Analyse", (TRIM, LINEARIZE))
         buttons.on_click(lambda event: self._on_analysis(event.target.value))
         self._result = gui.add_html("")
-
-    def _add_wind(self) -> None:
-        gui = self._server.gui
-        with gui.add_folder("Wind, velocity of the air", expand_by_default=False):
-            self._wind = [
-                gui.add_number(f"{name} [m/s]", 0.0, min=-100.0, max=100.0, step=0.5)
-                for name in ("North", "East", "Down")
-            ]
-            self._turbulence = gui.add_number("Turbulence, σ [m/s]", 0.0, min=0.0, max=20.0, step=0.1)
-            gui.add_button("Set wind").on_click(lambda _: self._on_wind())
-        self._record = gui.add_button(RECORD, hint="starts a log of the flight from now on, or ends the current one")
-        self._record.on_click(lambda _: self._on_record())
 
     # ----------------------------------------------------------------------------------------------------- actions
 
@@ -306,7 +300,7 @@ class FlyPanel:
             self.doublet()
         elif button in (TURBULENCE, CALM) and self._steerable:
             self._hint.visible = False
-            self._turbulence.value = LIGHT_TURBULENCE if button == TURBULENCE else 0.0
+            self._air.set_turbulence(LIGHT_TURBULENCE if button == TURBULENCE else 0.0)
             self._on_wind()
 
     def _on_record(self) -> None:
@@ -369,17 +363,14 @@ class FlyPanel:
         self._say(button, (trimmed is not None, message))
 
     def _on_wind(self) -> None:
-        velocity = np.array([number.value for number in self._wind])
         if self._steerable:
-            self._try("Wind", lambda: self._pilot.set_wind(velocity, self._turbulence.value))
+            self._try("Wind", lambda: self._pilot.set_wind(self._air.fields()))
 
     # ------------------------------------------------------------------------------------------------------ update
 
-    def show_wind(self, velocity: Array, turbulence: float) -> None:
-        """The wind that was set: steady, NED [m/s], shape (3,), and the largest part of its turbulence."""
-        for number, value in zip(self._wind, velocity, strict=True):
-            number.value = round(float(value), 3)
-        self._turbulence.value = round(turbulence, 3)
+    def show_wind(self, velocity: Array, turbulence: float, words: Mapping[str, str]) -> None:
+        """The wind that was set, see `AirPanel.show`."""
+        self._air.show(velocity, turbulence, words)
         if self._turbulent != (turbulence > 0.0):
             self._turbulent = turbulence > 0.0
             self._disturb.options = (DOUBLET, CALM if self._turbulent else TURBULENCE)

@@ -39,6 +39,8 @@ class Status:
         What is wrong with the recording; empty if nothing is.
     warnings : tuple of str
         Where the model does not hold.
+    model : str
+        Which model flies if it is not the full one; empty if it is, or not known.
     """
 
     playing: bool = False
@@ -48,6 +50,7 @@ class Status:
     log: str = ""
     log_state: str = ""
     warnings: tuple[str, ...] = ()
+    model: str = ""
 
 
 def condition_here(snapshot: Snapshot) -> TrimCondition:
@@ -164,7 +167,8 @@ def _state_line(status: Status, source: str) -> str:
     """What flies, how fast, where it is recorded, and what is wrong."""
     doing = f"playing, {status.real_time_factor:.2f} × real time" if status.playing else "paused"
     late = f" · missed deadlines {status.missed_deadlines}" if status.missed_deadlines else ""
-    lines = [f"<b>{escape(source)}</b> {doing}{late}"]
+    model = f" ({escape(status.model)} model)" if status.model else ""
+    lines = [f"<b>{escape(source)}</b>{model} {doing}{late}"]
     if status.log:
         lines.append(f'<span style="color:#5c6670">recording {escape(Path(status.log).name)}</span>')
     outside = (f"outside the model's validity: {text}" for text in joined(status.warnings))

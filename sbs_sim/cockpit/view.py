@@ -1,7 +1,7 @@
 """The page: a server, its scene and panels, and one `draw` that shows what there is, live or from a log."""
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -190,10 +190,10 @@ class View:
         self._logs.offer_live(True)
         self.show(None)
 
-    def show_wind(self, velocity: Array, turbulence: float) -> None:
-        """Show the wind that was set."""
+    def show_wind(self, velocity: Array, turbulence: float, words: Mapping[str, str]) -> None:
+        """Show the wind that was set, see `sbs_sim.cockpit.air_panel.AirPanel.show`."""
         if self._fly is not None:
-            self._fly.show_wind(velocity, turbulence)
+            self._fly.show_wind(velocity, turbulence, words)
 
     def _front(self) -> Keyed | None:
         """What keys act on."""

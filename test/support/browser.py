@@ -8,6 +8,7 @@ from typing import Any
 
 CHROMIUM = "chromium"
 SIZE = (1280, 800)
+PATIENCE = 60.0  # s that a page may take on a busy machine
 # WebGL in software; nothing that looks for other machines
 FLAGS = (
     "--use-angle=swiftshader",
@@ -31,14 +32,15 @@ def missing() -> str:
 
 
 @contextlib.contextmanager
-def page(url: str, size: tuple[int, int] = SIZE) -> Iterator[Any]:
-    """A page of a viewer, drawn and without the notice that it is drawn in software."""
+def page(url: str, size: tuple[int, int] = SIZE, scale: float = 1.0) -> Iterator[Any]:
+    """A page of a viewer, drawn with `scale` points each way to a pixel, without the notice that software draws it."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=shutil.which(CHROMIUM), args=list(FLAGS))
         try:
-            opened = browser.new_page(viewport={"width": size[0], "height": size[1]})
+            opened = browser.new_page(viewport={"width": size[0], "height": size[1]}, device_scale_factor=scale)
+            opened.set_default_timeout(1e3 * PATIENCE)
             opened.goto(url)
             opened.wait_for_selector("canvas")
             opened.get_by_role("img", name="artificial horizon").wait_for()

@@ -25,6 +25,7 @@ from node_rows import node_rows
 from option_rows import option_rows
 from peers import peer_rows
 from recording import recording_rows
+from stitched import stitched_rows
 
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTABLES = ROOT / "install" / "sbs_sim" / "lib" / "sbs_sim"
@@ -44,6 +45,7 @@ def main() -> None:
     parser.add_argument("--cold", action="store_true", help="also time a start without caches (half a minute)")
     arguments = parser.parse_args()
     rows: list[Row] = [*model_rows(timed), *option_rows(), *analysis_rows(timed)]
+    rows += stitched_rows(timed)
     rows += batch_rows(8, 5.0, 3, len(os.sched_getaffinity(0)))
     rows += [*peer_rows(), *recording_rows(10.0, 2.0), *start_rows(arguments.cold)]
     if arguments.node > 0:

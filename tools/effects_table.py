@@ -5,7 +5,8 @@
     ./run python tools/effects_table.py a:KEY=VALUE b:KEY=VALUE,KEY=VALUE --aircraft tandem --speeds 0 10
 
 Each effect has a name and the values that it sets. It is taken alone, and with several of them all together at the end,
-beside the aircraft as its file has it. Poles are in 1/s: `-0.2+-1.5i`; two real ones are `-0.3, 0.1`.
+beside the aircraft as its file has it. Those that exclude others are named after --alone. Poles are in 1/s:
+`-0.2+-1.5i`; two real ones are `-0.3, 0.1`.
 """
 
 import argparse
@@ -32,14 +33,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("effects", nargs="*", metavar="NAME:PATH=VALUE,...", help="an effect and what it sets")
     parser.add_argument("--aircraft", default="sbs")
+    parser.add_argument(
+        "--alone", nargs="+", default=[], metavar="NAME", help="effects that the rows with all of them leave out"
+    )
     parser.add_argument("--speeds", nargs="+", type=float, default=[0.0, 5.0, 10.0, 15.0, 20.0], metavar="M/S")
     options = parser.parse_args()
     effects = [effect.split(":", 1) for effect in options.effects]
     if any(len(effect) != 2 for effect in effects):
         parser.error("an effect is NAME:PATH=VALUE,PATH=VALUE")
     settings = {"none": "", **dict(effects)}
-    if len(effects) > 1:
-        settings["all"] = ",".join(values for _, values in effects)
+    for name in options.alone:
+        if name not in settings:
+            parser.error(f"--alone {name}: there is no effect of this name")
+    together = [values for name, values in effects if name not in options.alone]
+    if len(together) > 1:
+        settings["all"] = ",".join(together)
     base = Aircraft.load(options.aircraft)
     aircraft = {name: changed(base, values) for name, values in settings.items()}
     print(f"| {' | '.join(HEADINGS)} |\n|{'---|' * len(HEADINGS)}")

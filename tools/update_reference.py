@@ -28,13 +28,17 @@ REFERENCE = ROOT / "docs" / "reference"
 INTERFACES = ROOT / "msg_defs"
 NOTE = "<!-- Made by tools/update_reference.py: do not edit. -->"
 
-PARAMETERS = ("simulator", "control_mixer", "analysis", "hover_hold", "teleop", "joystick")
+PARAMETERS = ("simulator", "control_mixer", "analysis", "hover_hold", "excite", "frames", "teleop", "joystick")
 # What the definitions of others leave unsaid.
 MEANINGS = {
     "clock": "Simulation time: `/clock`, but `/left/clock` in the namespace `/left`.",
     "diagnostics": "Health of the nodes: time-outs, clipped controls, refused messages.",
+    "excitation": "What is added to the controls, whoever commands them; see the node `excite`.",
+    "joint_states": "Azimuth, lag, flap and pitch of every blade [rad], named as in `robot_description`.",
     "joy": "Axes and buttons of a pad or transmitter.",
     "odom": "The motion of `state` in the axes of ROS: earth ENU, body FLU.",
+    "cmd_vel": "Velocity along the heading in the axes of `base_link`: forward, left, up, and turn rate to the left.",
+    "robot_description": "URDF made from the aircraft file, for RViz and others.",
     "target": "Where to go: position and heading, in the frame `ned` or `odom`.",
     "pause": "Pauses the flight (true) or lets it go on (false).",
 }
@@ -287,6 +291,7 @@ def option_row(parser: argparse.ArgumentParser, action: argparse.Action) -> list
     text = (action.help or "") % {"prog": parser.prog, **vars(action)}
     names = action.option_strings or [""]
     metavar = action.metavar or ("|".join(map(str, action.choices)) if action.choices else action.dest.upper())
+    metavar = " ".join(metavar) if isinstance(metavar, tuple) else metavar
     value = f" {metavar}" if action.nargs != 0 else ""
     code = ", ".join(f"{name}{value}".strip() for name in names)
     more = " (several)" if action.nargs in ("+", "*") else ""

@@ -35,10 +35,12 @@ from sbs_sim.analysis.monte_carlo import gust_cases
 from sbs_sim.cockpit.recorded_snapshots import RecordedSnapshots
 from sbs_sim.config_file import config_folder
 from sbs_sim.errors import SbsError
+from sbs_sim.flight.gust_file import read_gust
 from sbs_sim.flight.mixer import Mixer
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.model.airfoil import read_table
-from sbs_sim.model.wind import Wind
+from sbs_sim.model.gust_table import GustTable
+from sbs_sim.model.wind import CHOICES, Wind
 from sbs_sim.pilot.augmentation import StickPilot, augmentation
 from sbs_sim.pilot.hover_hold import LIMITS, HoverHold, HoverModel, design
 from sbs_sim.pilot.joystick import Joystick, JoystickFile
@@ -305,6 +307,10 @@ def check_wind(given: dict[str, Any]) -> None:
             assert np.isfinite(simulation.state).all()
 
 
+LOCAL_NUMBERS = (
+    *("turbulence_lateral_length", "turbulence_vertical_length", "turbulence_span", "gust_length", "gust_direction"),
+    *("gust_distance", "reference_height", "roughness_length", "profile_exponent"),
+)
 TRIPLES = st.tuples(NUMBERS, NUMBERS, NUMBERS) | st.just((1.0, 2.0, -1.0)) | ANYTHING
 WINDS = st.fixed_dictionaries(
     {},
@@ -315,8 +321,26 @@ WINDS = st.fixed_dictionaries(
         ),
         "turbulence_direction": NUMBERS | ANYTHING,
         "turbulence_seed": st.integers() | ANYTHING,
+        **{name: st.sampled_from(words) | ANYTHING for name, words in CHOICES.items()},
+        **dict.fromkeys(LOCAL_NUMBERS, NUMBERS | st.floats(0.1, 10.0) | ANYTHING),
+        "gust_origin": TRIPLES,
+        "own_gust": st.just(GustTable("distance", [0.0, 2.0], [[0.0, 1.0, 0.0], [2.0, 0.0, -1.0]])) | ANYTHING,
     },
 )
+GUST_TEXTS = (
+    b"time [s],north [m/s],east [m/s],down [m/s]\n0,0,0,0\n1,1,-2,3\n",
+    b"distance [m],north [m/s],east [m/s],down [m/s]\n-2,0,0,0\n\n1.5,1,-2,3\n7,0,0,0\n",
+)
+
+
+def check_gust_file(data: bytes) -> None:
+    """A table of an own gust; what is read blows finitely, at every time or distance."""
+    with scratch() as folder:
+        (folder / "gust.csv").write_bytes(data)
+        with refusing():
+            table = read_gust(folder / "gust.csv")
+            assert np.isfinite(table.at(np.array([-1e9, 0.0, 0.5, 1e9]))).all()
+            check_wind({"own_gust": table, "turbulence_extent": "elements"})
 
 
 def check_mixer(moves: list[tuple[Any, Any]]) -> None:
@@ -951,11 +975,19 @@ OPTIONS["sweep"] = {
     "--csv": TARGETS,
     "--values": WORDS,
 }
+AIR_OPTIONS = {
+    "--extent": st.sampled_from(["point", "rates", "field", "elements", "both", ""]),
+    "--spectrum": st.sampled_from(["dryden", "von_karman", "karman"]),
+    "--severity": st.sampled_from(["light", "severe", "none"]),
+    "--height": st.sampled_from(["30", "-1e9", "1e9", "nan", "x"]),
+    "--gust-file": st.sampled_from(["a.csv", "nothing.csv", ".", "/dev/zero", ""]),
+}
 OPTIONS["batch"] = {
     **OPTIONS["trim"],
     "--flights": st.sampled_from(["1", "2", "0", "-1", "x", "99999999999"]),
     "--duration": st.sampled_from(["0.05", "0", "-1", "nan", "1e9"]) | WORDS.filter(lambda text: text != "15"),
     **dict.fromkeys(("--turbulence", "--length", "--seed"), st.sampled_from(["0", "1", "-1", "1e9"]) | WORDS),
+    **AIR_OPTIONS,
     "--spread": st.sampled_from(["body.mass=0.05", "body.mass=2", "name=0.1", "rotors=0.1", "x"]) | WORDS,
     "--every": st.sampled_from(["0.1", "0", "1e9", "nan"]) | WORDS,
     "--workers": OPTIONS["sweep"]["--workers"],
@@ -969,6 +1001,9 @@ OPTIONS["gusts"] = {
         ("--wind", "--turbulence", "--length", "--gust", "--gust-duration"),
         st.sampled_from(["0", "101", "-1e9"]) | WORDS,
     ),
+    **AIR_OPTIONS,
+    "--rule": st.sampled_from(["cs25", "cs27", "cs99", ""]),
+    "--gradient": st.sampled_from(["20", "0", "-1", "nan", "1e9"]),
     "--seed": st.sampled_from(["0", "-1", "1e9", "99999999999999999999"]) | WORDS,
     "--duration": st.sampled_from(["1", "0", "1e9", "nan"]),
     "--delay": st.sampled_from(["1", "-1", "101", "x"]),
@@ -1052,6 +1087,7 @@ FUZZ_TARGETS = (
     FuzzTarget("trim, linearize, sweep", TRIMS, check_trim, 3.0),
     FuzzTarget("Simulation, simulate", SIMULATIONS, check_simulation, 3.0),
     FuzzTarget("Wind", WINDS, check_wind, 2.0),
+    FuzzTarget("own gust, CSV", mutated(GUST_TEXTS, CSV_PIECES), check_gust_file, 1.0),
     FuzzTarget("Mixer", MOVES, check_mixer, 2.0),
     FuzzTarget("with_value", VALUES, check_value, 2.0),
     FuzzTarget("simulate_batch", BATCHES, check_batch, 2.0),

@@ -61,9 +61,14 @@ SERVICES = {
     "analysis/set_parameters": SetParameters,
 }
 TOPICS = {"controls": Controls, "swashplate": SwashplateArray}
-PARAMETERS = ("real_time_factor", "command_timeout", "airspeed", "aircraft", "record", "use_sim_time", "nothing", "")
+PARAMETERS = ("real_time_factor", "command_timeout", "airspeed", "aircraft", "record", "use_sim_time", "nothing", "",
+              "turbulence_extent", "turbulence_model", "wind_profile", "gust_file")  # fmt: skip
 NUMBERS = st.sampled_from(EXTREMES) | st.floats() | st.floats(-20.0, 20.0)
-WORDS = st.sampled_from(["", "newton", "paper", "two_loop", "../x", "airspeed", "body.mass", "x" * 1000, "é\n"])
+GUST = "distance [m],north [m/s],east [m/s],down [m/s]\n0,0,0,0\n2,1,-2,3\n"
+WORDS = st.sampled_from(
+    ["", "newton", "paper", "two_loop", "../x", "airspeed", "body.mass", "x" * 1000, "é\n"]
+    + ["field", "elements", "rates", "von_karman", "ramp", "power", "logarithmic", GUST, GUST + "1,,nan"]
+)
 INTEGERS = {f"{sign}int{bits}": (bits, not sign) for sign in ("", "u") for bits in (8, 16, 32, 64)}
 
 

@@ -53,6 +53,7 @@ def _use_constant_speeds() -> None:
     simulation = Simulation(aircraft, trimmed_state(aircraft, hover), hover.swashplate)
     simulation.snapshot()
     simulation.set_wind(Wind(turbulence_intensity=(1.0, 1.0, 1.0), turbulence_extent="field"))  # a flight would stand
+    simulation.snapshot()
     simulation.advance()
     linearize(aircraft, point=hover, method="paper")
     simulate_batch([Case(aircraft, hover, wind=wind)] * lane_count(), 0.01, workers=1)

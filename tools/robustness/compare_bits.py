@@ -69,7 +69,10 @@ WAYS: dict[str, dict[str, str]] = {
     "numpy-sse": {"NPY_DISABLE_CPU_FEATURES": NO_AVX},
     "interpreted": {OWN: "", "NUMBA_DISABLE_JIT": "1"},
 }
-NEEDS = {"haswell": "avx2", "x86-64-v3": "avx2", "znver4": "avx512bf16"}  # features
+NEEDS = {
+    "haswell": "avx2", "x86-64-v3": "avx2", "znver4": "avx512bf16",
+    "blas-Haswell": "avx2", "blas-SkylakeX": "avx512f", "blas-Zen": "avx2", "blas-Sandybridge": "avx",
+}  # features, without which a process ends with SIGILL  # fmt: skip
 USUAL = tuple(way for way in WAYS if way != "interpreted")
 SPEED, SECONDS = 5.0, 0.5  # m/s, s of each flight
 PARTITIONED_STEP = math.radians(2.0)  # longer ones leave the plausible in the gust: its error is of first order

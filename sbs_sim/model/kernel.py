@@ -9,6 +9,7 @@ import contextlib
 import fcntl
 import functools
 import gc
+import hashlib
 import logging
 import os
 from collections.abc import Callable, Iterator
@@ -118,10 +119,9 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     with _cache_in(folder):
         dispatcher = numba.njit(cache=True, pipeline_class=_Entry, **OPTIONS)(function)
     if not numba.config.DISABLE_JIT:
-        # numba would load first all that it could need to compile, scipy.linalg included, for a quarter of a second
-        dispatcher._cache.load_overload = dispatcher._cache._load_overload
         kept = dispatcher._cache._cache_file
         kept.save = _alone(kept.save, folder)
+        _compile_once(dispatcher, folder)
     return _prepared(dispatcher)
 
 
@@ -137,6 +137,42 @@ def _alone(save: Callable[..., None], folder: Path) -> Callable[..., None]:
             os.close(descriptor)
 
     return save_alone
+
+
+def _compile_once(dispatcher: Any, folder: Path) -> None:
+    """Let a process that needs what another one compiles wait for its machine code, and not compile it as well."""
+    cache, compile_one = dispatcher._cache, dispatcher.compile
+    held: list[int] = []  # the lock of what is being compiled; numba compiles in one thread at a time
+
+    def look_and_wait(signature: Any, target: Any) -> Any:
+        # `load_overload` would load first all that numba could need to compile, scipy.linalg included, for a quarter
+        # of a second
+        found = cache._load_overload(signature, target)
+        if found is None:
+            wanted = f"{cache._cache_file._index_path} {signature} {target.codegen().magic_tuple()}"
+            name = f"{hashlib.sha256(wanted.encode()).hexdigest()[:16]}.lock"
+            with contextlib.suppress(OSError):  # where there are no locks everybody compiles
+                held.append(os.open(folder / name, os.O_CREAT | os.O_RDWR, 0o600))
+                _wait_for(held[-1])
+            found = cache._load_overload(signature, target)
+        return found
+
+    def compile_once(signature: Any) -> Any:
+        try:
+            return compile_one(signature)
+        finally:
+            if held:
+                os.close(held.pop())
+
+    cache.load_overload, dispatcher.compile = look_and_wait, compile_once
+
+
+def _wait_for(lock: int) -> None:
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        _say_that_it_takes_time()
+        fcntl.flock(lock, fcntl.LOCK_EX)
 
 
 def _prepared(dispatcher: Any) -> Any:

@@ -124,15 +124,30 @@ def plant(place, mark, mode):
 
 def run_with(package, chosen, home):
     """Result of a process of the copy with these folders for caches."""
+    started = start_with(package, chosen, home, CODE)
+    output, errors = started.communicate()
+    return subprocess.CompletedProcess(started.args, started.returncode, output, errors)
+
+
+def start_with(package, chosen, home, code):
+    """A process of the copy with these folders for caches."""
     folders = {"NUMBA_CACHE_DIR": str(chosen), "XDG_CACHE_HOME": str(home), "TMPDIR": str(package)}
-    return subprocess.run(
-        [sys.executable, "-c", CODE],
+    return subprocess.Popen(
+        [sys.executable, "-c", code],
         env={**os.environ, **folders, "PYTHONPATH": f"{package}:{os.environ.get('PYTHONPATH', '')}"},
         cwd=package,
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        check=False,
     )
+
+
+def test_of_processes_that_need_the_same_at_once_one_compiles(package, tmp_path):
+    code = CODE + "print(sum(lowest_point.stats.cache_misses.values()))"
+    started = [start_with(package, tmp_path / "chosen", tmp_path / "home", code) for _ in range(4)]
+    outputs = [process.communicate() for process in started]
+    assert [output.splitlines()[0] + "\n" for output, _ in outputs] == [RESULT] * 4, outputs
+    assert sorted(int(output.splitlines()[1]) for output, _ in outputs) == [0, 0, 0, 1]
 
 
 @pytest.mark.parametrize("mode", [0o700, 0o777])

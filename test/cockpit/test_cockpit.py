@@ -790,7 +790,7 @@ def page(flying):
         if os.environ.get("CI"):
             pytest.fail(reason)
         pytest.skip(reason)
-    with browser.page(flying[2], scale=0.5) as opened:  # a quarter of the points: software draws them
+    with browser.page(flying[2], scale=0.25) as opened:  # few points: software draws them
         yield opened
 
 

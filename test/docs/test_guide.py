@@ -235,7 +235,7 @@ def test_what_the_site_adds_to_the_pages(tmp_path):
     made = sorted(page.stem for page in (tmp_path / "docs" / "reference" / "api").glob("*.rst"))
     assert "../../sbs_sim" not in api
     assert len(made) > 40
-    assert all(f"\napi/{name}.rst\n" in api and importlib.util.find_spec(name) for name in made)
+    assert all(f"(api/{name}.rst)" in api and importlib.util.find_spec(name) for name in made)
     listed = re.findall(r"^\w[\w :,\"-]* <([\w./]+\.md)>$", index, re.MULTILINE)
     assert len(listed) == len(set(listed))
     assert {

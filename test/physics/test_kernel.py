@@ -79,7 +79,7 @@ PLAIN = """
     flights = [simulate(small, point, point.controls, 0.004, wind=air, method=m, **step) for m in ("rk4", "tsit5")]
     batch = simulate_batch([Case(small, point, wind=air)], 0.004, every=2, **step)
     found = sweep(small, "airspeed", [0.0], linear=False, **rough)
-    model = linearize(small, point=point, method="paper")
+    model = linearize(small, point=point)
     numbers = [
         *(value for flight in flights for value in flight["state"][-1]),
         *batch["state"][0, -1],

@@ -35,10 +35,10 @@ STATE_TOPICS = {"state": BodyState, "rotors": RotorStateArray, "inflow": InflowA
 
 
 def replay(*arguments, domain=1, **variables):
-    """Run the executable to its end, with further variables of the environment."""
+    """Run the executable to its end, with further variables of the environment: it may have to compile."""
     command = [sys.executable, str(EXECUTABLES / "replay"), *map(str, arguments)]
     found = {**environment(domain), **variables}
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=found)
+    return subprocess.run(command, capture_output=True, text=True, timeout=600, check=False, env=found)
 
 
 def fly(tmp_path, act, **parameters):

@@ -1,7 +1,8 @@
 """Faults of configuration data against a JSON schema, in words."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Set
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,44 @@ TYPE_WORDS = {
 }
 
 
-def problems(data: Any, validator: Any) -> list[str]:
+# Identities of values and of the schemas that accepted them: what is checked now leaves them out.
+_accepted: ContextVar[Set[tuple[int, int]]] = ContextVar("_accepted", default=frozenset())
+
+
+def validator_of(schema: Mapping[str, Any]) -> Any:
+    """Validator for `problems`, which leaves out what was accepted."""
+    from jsonschema import Draft202012Validator, validators  # here, because it is slow to import and needed once
+
+    def properties(validator: Any, schemas: Mapping[str, Any], instance: Any, _: Any) -> Iterator[Any]:
+        known = _accepted.get()
+        if validator.is_type(instance, "object"):
+            for key, inner in schemas.items():
+                if key in instance and (id(instance[key]), id(inner)) not in known:
+                    yield from validator.descend(instance[key], inner, path=key, schema_path=key)
+
+    def items(validator: Any, inner: Mapping[str, Any], instance: Any, _: Any) -> Iterator[Any]:
+        known = _accepted.get()
+        if validator.is_type(instance, "array"):
+            for i, item in enumerate(instance):
+                if (id(item), id(inner)) not in known:
+                    yield from validator.descend(item, inner, path=i)
+
+    return validators.extend(Draft202012Validator, {"properties": properties, "items": items})(schema)
+
+
+def _identities(value: Any, schema: Mapping[str, Any]) -> Iterator[tuple[int, int]]:
+    """Identities of all values that a schema has accepted, and of its parts for them."""
+    yield id(value), id(schema)
+    if isinstance(value, dict):
+        for key, inner in schema.get("properties", {}).items():
+            if key in value:
+                yield from _identities(value[key], inner)
+    elif isinstance(value, list) and "items" in schema:
+        for item in value:
+            yield from _identities(item, schema["items"])
+
+
+def problems(data: Any, validator: Any, accepted: Any = None) -> list[str]:
     """All faults of size, keys, types and ranges, each as "path = value: what is allowed".
 
     Parameters
@@ -26,10 +64,17 @@ def problems(data: Any, validator: Any) -> list[str]:
     data : object
         As read from YAML.
     validator : jsonschema validator
+        See `validator_of`.
+    accepted : object, optional
+        Data without faults. Values of `data` that are the same objects in the same places are not checked again.
     """
     if fault := _size_fault(data):  # first: the checks below visit every value
         return [fault]
-    errors = sorted(validator.iter_errors(data), key=lambda error: list(map(str, error.path)))
+    token = _accepted.set(frozenset() if accepted is None else set(_identities(accepted, validator.schema)))
+    try:
+        errors = sorted(validator.iter_errors(data), key=lambda error: list(map(str, error.path)))
+    finally:
+        _accepted.reset(token)
     # only in data that the schema accepts is the search for numbers that are not finite sure to end
     found = [_explain(error) for error in errors] or [
         f"{path} = {value}: allowed is a finite number" for path, value in _not_finite(data, "")

@@ -38,7 +38,7 @@ from sbs_sim.aircraft.paths import (
 )
 from sbs_sim.content import same
 from sbs_sim.errors import AircraftError
-from sbs_sim.model.airfoil import AirfoilTable, attached_lift, stall_angles
+from sbs_sim.model.airfoil import AirfoilTable
 from sbs_sim.model.frames import ONE, hub_axes
 from sbs_sim.model.mixing import mixed
 from sbs_sim.model.packing import by_blades, lane_count, side_by_side
@@ -121,7 +121,7 @@ class Aircraft(Description):
     @classmethod
     def _made_of(cls, data: Any, folder: Path, similar: Aircraft | None = None) -> Aircraft:
         """Checked aircraft of a mapping; airfoil tables that a similar aircraft has are not read again."""
-        if problems := validation.problems(data, _validator(cls)):
+        if problems := validation.problems(data, _validator(cls), similar and similar.data):
             raise AircraftError("; ".join(problems))
         data = separate(data)
         values = values_of(cls, data)
@@ -573,18 +573,12 @@ class Aircraft(Description):
         """
         size = max(len(table.numbers) for tables in self.sections for table in tables)
         most = max(map(len, self.sections))
-        return np.array([[_stall_rows(table, size) for table in _filled_up(tables, most)] for tables in self.sections])
+        rows = [[table.stall for table in _filled_up(tables, most)] for tables in self.sections]
+        return np.array([[np.pad(one, ((0, 0), (0, size - one.shape[1])), "edge") for one in own] for own in rows])
 
 
 def _filled_up(tables: tuple[AirfoilTable, ...], count: int) -> tuple[AirfoilTable, ...]:
     return (*tables, *[tables[-1]] * (count - len(tables)))
-
-
-def _stall_rows(table: AirfoilTable, size: int) -> Array:
-    count = len(table.numbers)
-    ends = (np.full(count, end) for end in table.range)
-    rows = (table.numbers, *stall_angles(table), *ends, *attached_lift(table))
-    return np.pad(rows, ((0, 0), (0, size - count)), "edge")
 
 
 def axis_controls(axes: Sequence[str], units: Sequence[str]) -> NDArray[np.int64]:
@@ -607,9 +601,7 @@ def axis_controls(axes: Sequence[str], units: Sequence[str]) -> NDArray[np.int64
 @cached_by_class
 def _validator(record: type) -> Any:
     """JSON schema validator of files with the declared values of a dataclass."""
-    from jsonschema import Draft202012Validator  # here, because it is slow to import and needed once
-
-    return Draft202012Validator(schema_of(record))
+    return validation.validator_of(schema_of(record))
 
 
 def _python(value: Any) -> Any:

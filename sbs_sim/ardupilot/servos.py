@@ -239,6 +239,4 @@ def _place(rows: Sequence[Row], owner: str, name: str) -> int:
 
 
 def _validator() -> Any:
-    from jsonschema import Draft202012Validator  # here, because it is slow to import and needed once
-
-    return Draft202012Validator(json.loads((config_folder() / "ardupilot.schema.json").read_text(encoding="utf-8")))
+    return validation.validator_of(json.loads((config_folder() / "ardupilot.schema.json").read_text(encoding="utf-8")))

@@ -90,6 +90,12 @@ class AirfoilTable(ByContent):
         angles = self.alpha[rises] + share * (self.alpha[rises + 1] - self.alpha[rises])
         return float(angles[np.argmin(np.abs(angles))])
 
+    @cached_property
+    def stall(self) -> Array:
+        """What `sbs_sim.Aircraft.stall_table` has of it, shape (7, n)."""
+        ends = (np.full(len(self.numbers), end) for end in self.range)
+        return np.array([self.numbers, *stall_angles(self), *ends, *attached_lift(self)])
+
     @property
     def knots(self) -> Array:
         """Numbers between which the compiled model interpolates, at least two."""

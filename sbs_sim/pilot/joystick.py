@@ -77,9 +77,7 @@ class JoystickFile(ByContent):
 
 
 def _validator() -> Any:
-    from jsonschema import Draft202012Validator  # here, because it is slow to import and needed once
-
-    return Draft202012Validator(json.loads((config_folder() / "joystick.schema.json").read_text(encoding="utf-8")))
+    return validation.validator_of(json.loads((config_folder() / "joystick.schema.json").read_text(encoding="utf-8")))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,9 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
-from sbs_sim import Aircraft, simulate, trim
+from sbs_sim import Aircraft, simulate, trim, validation
+from sbs_sim.aircraft import paths
+from sbs_sim.aircraft.declaration import schema_of
 from sbs_sim.aircraft.description import Rotor
 from sbs_sim.aircraft.paths import unit_of
 from sbs_sim.config_file import config_folder
@@ -1428,3 +1430,33 @@ def test_an_impossible_combination_is_refused_with_all_changes_named(sbs):
         sbs.with_values(many)
     with pytest.raises(AircraftError, match="values = 5: allowed are objects of the class Mapping"):
         sbs.with_values(5)
+
+
+def leaves(data, location=()):
+    """Locations of the values in nested mappings and lists."""
+    if isinstance(data, dict | list):
+        for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+            yield from leaves(value, (*location, key))
+    else:
+        yield location
+
+
+@pytest.mark.parametrize("name", ["sbs", "uh60a_tm85890", "quadrotor"])
+def test_what_was_accepted_is_not_checked_again_and_hides_no_fault(name):
+    """A change has the faults that the whole file with it has, at the value, beside it and above it."""
+    data = Aircraft.load(name).data
+    validator = validation.validator_of(schema_of(Aircraft))
+    places = list(leaves(data))[::5]
+    places = [*places, *{place[:-1] for place in places if len(place) > 1}]
+    found = 0
+    for i, place in enumerate(places):
+        wrong = (-1.0, "x", None, [], {}, math.nan, [[0.0]], True)[i % 8]
+        for changed in (
+            paths.replaced(data, place, wrong),
+            paths.without(data, place) if isinstance(place[-1], str) else data,
+        ):
+            faults = validation.problems(changed, validator, data)
+            assert faults == validation.problems(copy.deepcopy(changed), validator), place
+            found += bool(faults)
+    assert found > 20
+    assert validation.problems(data, validator, data) == []

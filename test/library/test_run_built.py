@@ -14,6 +14,7 @@ pytest.importorskip("rclpy")
 from ros_harness import DOMAINS
 
 ROOT = Path(__file__).resolve().parents[2]
+DISTRIBUTION = os.environ.get("ROS_DISTRO")  # whose wheels ./run has set up
 pytestmark = pytest.mark.skipif(
     os.environ.get("SBS_SIM_RUN") != f"private:{ROOT}", reason="the private environment of ./run is not what tests it"
 )
@@ -64,14 +65,14 @@ def test_the_shell_finds_ros_whatever_the_users_own_start_up_does(tmp_path):
     for python in ("python", "python3"):
         place, own, distribution = in_shell(tmp_path, f'{python} -c "{look}"')
         assert Path(place).is_relative_to(ROOT / ".venv")
-        assert (own, distribution) == ("kept", "jazzy")
+        assert (own, distribution) == ("kept", DISTRIBUTION)
 
 
 def test_the_shell_has_what_tools_of_ros_ask_for(tmp_path):
     words = "$ROS_DISTRO $ROS_VERSION $ROS_PYTHON_VERSION $ROS_PYTHON_CHECK_FIELDS"
-    assert in_shell(tmp_path, f"echo {words}") == ["jazzy", "2", "3", "1"]
+    assert in_shell(tmp_path, f"echo {words}") == [DISTRIBUTION, "2", "3", "1"]
     # and a shell of another folder is no sourced ROS 2
-    inner = {"ROS_DISTRO": "jazzy", "SBS_SIM_RUN": "private:/elsewhere", "ROS_PYTHON_CHECK_FIELDS": "0"}
+    inner = {"ROS_DISTRO": DISTRIBUTION, "SBS_SIM_RUN": "private:/elsewhere", "ROS_PYTHON_CHECK_FIELDS": "0"}
     code = "import os; print(*map(os.environ.get, ('SBS_SIM_RUN', 'ROS_PYTHON_CHECK_FIELDS')))"
     found = call(tmp_path, "python", "-c", code, **inner)
     assert found.stdout.split() == [f"private:{ROOT}", "0"]

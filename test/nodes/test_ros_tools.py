@@ -36,6 +36,7 @@ LATER = {
 ASK_AGAIN = 10.0  # s without an answer
 OVERRIDDEN = {"destroy_node", "notify_execute"}  # on purpose, and they call the one below
 OF_EVERY_CLASS = {"__init__", "__module__", "__doc__", "__qualname__", "__firstlineno__", "__static_attributes__"}
+OF_EVERY_CLASS |= {"__parameters__", "__orig_bases__"}  # of a generic base, as rclpy's are since Kilted
 
 
 def own_classes(base):

@@ -74,6 +74,8 @@ def _tried(wheels: str, place: Path, tests: list[str]) -> bool:
     if built.returncode:
         print(f"{wheels}: does not build\n{built.stdout}", flush=True)
         return False
+    browser = ("--no-deps", "--require-hashes", "-r", "requirements/browser.lock")
+    run("./run", "python", "-m", "pip", "install", "--quiet", *browser)  # without it the tests of the page are left out
     versions = run("./run", "python", "-c", LOOK).stdout.strip()
     print(f"{wheels}: {versions}, built after {time.monotonic() - begin:.0f} s", flush=True)
     found = run("./run", "test", "-q", *tests)

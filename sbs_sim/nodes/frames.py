@@ -1,9 +1,9 @@
 """Node `frames`: the aircraft as ROS tools want to see it, for RViz and others.
 
 Publishes `robot_description` (a URDF made from the aircraft file), `joint_states` (azimuth, lag, flap and pitch of each
-blade) and the frames map, odom, base_link and those of hubs and blades on `/tf` and `/tf_static`. Subscribes `odom`,
-`rotors`, `events`, of a simulator or of a log that is played. A node of its own: a flight that nobody looks at this way
-pays nothing.
+blade) and the frames map, odom, base_link, those of hubs, blades and sensors on `/tf` and `/tf_static`. Subscribes
+`odom`, `rotors`, `events`, of a simulator or of a log that is played. A node of its own: a flight that nobody looks at
+this way pays nothing.
 """
 
 import importlib
@@ -31,7 +31,8 @@ from sbs_sim.nodes.pilot_node import NEWEST_QOS
 from sbs_sim.nodes.process import run
 from sbs_sim.nodes.qos import EVENT_QOS, LATCHED_QOS, STATE_QOS
 from sbs_sim.nodes.rejections import Rejections
-from sbs_sim.output.robot import FIXED, Joint, joint_angles, joints, urdf
+from sbs_sim.output.robot import FIXED, Joint, joint_angles, joints, sensor_joints, urdf
+from sbs_sim.sensors.settings import SETTINGS, checked
 
 Array = NDArray[np.float64]
 
@@ -47,6 +48,7 @@ def _tf_message() -> Any:
 TFMessage = _tf_message()
 FRAME_MAP = "map"
 NO_TF = "no /tf: the package tf2_msgs is not installed; robot_description and joint_states are published"
+IMU_POSITION = "imu.position"
 PARAMETERS = {
     "aircraft": Parameter("sbs", "Aircraft: a name in config/aircraft, or the path of a file"),
     "rate": Parameter(
@@ -57,8 +59,12 @@ PARAMETERS = {
         1000.0,
     ),
     "frame_prefix": Parameter("", "Before the names of all frames but map on /tf, for several aircraft: left/"),
+    IMU_POSITION: Parameter(
+        SETTINGS[IMU_POSITION].default, "As that of the simulator, for imu_link. " + SETTINGS[IMU_POSITION].description
+    ),
     "joint_frames": Parameter(
-        True, "Publish the frames of hubs and blades; false where robot_state_publisher makes them of joint_states"
+        True,
+        "Publish the frames of hubs, blades and sensors; false where robot_state_publisher makes them of joint_states",
     ),
 }
 
@@ -70,7 +76,8 @@ class Frames(Component):
         super().__init__("frames")
         settings = declare(self, PARAMETERS)
         self._aircraft = aircraft = Aircraft.load(settings["aircraft"])
-        self._joints = joints(aircraft)
+        sensors = sensor_joints(checked({IMU_POSITION: settings[IMU_POSITION]})[IMU_POSITION])
+        self._joints = [*joints(aircraft), *sensors]
         self._moving = [joint for joint in self._joints if joint.kind != FIXED]
         self._with_joints, self._prefix = settings["joint_frames"], settings["frame_prefix"]
         self._period, self._last = 1.0 / settings["rate"], {"odom": -math.inf, "rotors": -math.inf}
@@ -78,7 +85,7 @@ class Frames(Component):
         self._rejections = {name: Rejections(self, name) for name in ("odom", "rotors", "events")}
         self._states = self.create_publisher(JointState, "joint_states", STATE_QOS)
         self._description = self.create_publisher(String, "robot_description", LATCHED_QOS)
-        self._description.publish(String(data=urdf(aircraft)))
+        self._description.publish(String(data=urdf(aircraft, sensors)))
         self._tf = self._tf_publisher("/tf", STATE_QOS)
         self._tf_static = self._tf_publisher("/tf_static", LATCHED_QOS)
         if self._tf_static is None:

@@ -19,11 +19,10 @@ from sbs_sim.nodes.conversions import FRAME_BASE, enu_flu_quaternion, set_quater
 from sbs_sim.nodes.parameters import Parameter
 from sbs_sim.nodes.qos import STATE_QOS
 from sbs_sim.nodes.recorded_publisher import MessageLog, RecordedPublisher
+from sbs_sim.output.robot import IMU, RANGE
 from sbs_sim.sensors.settings import SETTINGS, Setting
 from sbs_sim.sensors.suite import Clock, Measurement, SensorSuite
 
-FRAME_IMU = "imu_link"  # parallel to base_link, at imu.position
-FRAME_RANGE = "range_link"  # at base_link, its x-axis along the beam: down
 TOPICS = {
     "imu": ("imu/data", Imu),
     "gnss": ("fix", NavSatFix),
@@ -105,7 +104,7 @@ def imu_message(measurement: Measurement) -> Imu:
     """Angular velocity, specific force and attitude."""
     p, q, r, x, y, z, *attitude = measurement.values.tolist()
     message = Imu()
-    message.header.frame_id = FRAME_IMU
+    message.header.frame_id = IMU
     set_vector(message.angular_velocity, (p, -q, -r))
     set_vector(message.linear_acceleration, (x, -y, -z))
     set_quaternion(message.orientation, enu_flu_quaternion(attitude))
@@ -150,7 +149,7 @@ def magnetic_message(measurement: Measurement) -> MagneticField:
 def range_message(measurement: Measurement, least: float, most: float) -> Range:
     """Distance to the ground; infinite beyond the limits, as REP 117 has it."""
     message = Range(radiation_type=Range.INFRARED, field_of_view=0.0, min_range=least, max_range=most)
-    message.header.frame_id = FRAME_RANGE
+    message.header.frame_id = RANGE
     message.range = float(measurement.values[0])
     if hasattr(message, "variance"):  # Humble has none
         message.variance = float(measurement.variances[0])

@@ -12,7 +12,7 @@ from typing import Any
 from xml.etree import ElementTree as Xml
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.description import Rotor
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 BASE = "base_link"
 BODY = "body"
+IMU, RANGE = "imu_link", "range_link"  # frames of sensors
 FIXED, CONTINUOUS, REVOLUTE = "fixed", "continuous", "revolute"  # kinds of joints in URDF
 FLU = np.diag([1.0, -1.0, -1.0])  # components in FLU of those in FRD, and back
 HALF_TURN = math.pi / 2  # limit of hinges [rad]: none of the model's blades gets there
@@ -73,6 +74,21 @@ def joints(aircraft: Aircraft) -> list[Joint]:
     return found
 
 
+def sensor_joints(imu_position: ArrayLike = (0.0, 0.0, 0.0)) -> list[Joint]:
+    """What holds the frames of sensors: the IMU, parallel to base_link, and the beam of the range sensor.
+
+    Parameters
+    ----------
+    imu_position : array_like, shape (3,)
+        Place of the IMU against the c.g.: forward, right, down [m].
+    """
+    down = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])  # x down, as `sensor_msgs/Range` has its beam
+    return [
+        _fixed("imu", BASE, IMU, FLU @ np.asarray(imu_position), np.eye(3)),
+        _fixed("range", BASE, RANGE, np.zeros(3), down),
+    ]
+
+
 def joint_angles(
     rotor: Rotor, azimuth: float, flap: Sequence[float], lag: Sequence[float], swashplate: Array
 ) -> list[float]:
@@ -98,8 +114,8 @@ def joint_angles(
     return found
 
 
-def urdf(aircraft: Aircraft) -> str:
-    """URDF of an aircraft: what `joints` has, with a body, discs and blades to look at.
+def urdf(aircraft: Aircraft, more: Sequence[Joint] = ()) -> str:
+    """URDF of an aircraft: what `joints` has and more, with a body, discs and blades to look at.
 
     Mass and inertia of the whole aircraft, its blades included, are those of the link "body": base_link has none, since
     some readers refuse a root that has. The shape of the body is a box around contact points, with rods to the hubs.
@@ -110,7 +126,7 @@ def urdf(aircraft: Aircraft) -> str:
         shown[BODY] += _boom(rotor)
         shown[f"{rotor.name}_hub"] = [_disc(rotor)]
         shown |= {f"{rotor.name}_blade_{k}": [_blade(rotor)] for k in range(1, rotor.blades + 1)}
-    every = joints(aircraft)
+    every = [*joints(aircraft), *more]
     for name in (BASE, *(joint.child for joint in every)):
         Xml.SubElement(robot, "link", name=name).extend(shown.get(name, ()))
     robot.extend(_joint_element(joint) for joint in every)

@@ -9,10 +9,11 @@ import pytest
 
 from sbs_sim import Aircraft
 from sbs_sim.cockpit.geometry import blade_azimuths, blade_poses
-from sbs_sim.output.robot import BASE, CONTINUOUS, FIXED, joint_angles, joints, urdf
+from sbs_sim.output.robot import BASE, CONTINUOUS, FIXED, joint_angles, joints, sensor_joints, urdf
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 AIRCRAFT = ("sbs", "uh60a_tm85890", "quadrotor", str(DATA / "tail_rotor.yaml"), str(DATA / "tandem.yaml"))
+SBS = Aircraft.load("sbs")
 FLU = np.diag([1.0, -1.0, -1.0])
 
 
@@ -142,6 +143,18 @@ def test_the_urdf_is_one_tree_with_the_mass_of_the_aircraft(name):
     assert float(inertia.get("iyz")) == pytest.approx(aircraft.body.inertia[1][2], abs=1e-12)  # y and z are turned
     turning = [joint for joint in robot.iter("joint") if joint.get("type") == CONTINUOUS]
     assert len(turning) == len(aircraft.rotors)
+
+
+def test_frames_of_sensors():
+    """The beam of a range sensor is the x axis of its frame (sensor_msgs/Range), and goes down."""
+    poses = link_poses(urdf(SBS, sensor_joints([0.3, 0.1, 0.2])), {joint.name: 0.0 for joint in joints(SBS)})
+    place, axes = poses["imu_link"]
+    np.testing.assert_allclose(place, [0.3, -0.1, -0.2], atol=1e-12)
+    np.testing.assert_allclose(axes, np.eye(3), atol=1e-12)
+    place, axes = poses["range_link"]
+    np.testing.assert_allclose(place, np.zeros(3), atol=1e-12)
+    np.testing.assert_allclose(axes[:, 0], [0.0, 0.0, -1.0], atol=1e-9)  # angles have twelve digits in the text
+    assert np.linalg.det(axes) == pytest.approx(1.0)
 
 
 def test_a_shaft_that_points_ahead_has_finite_angles():

@@ -16,7 +16,7 @@ from std_msgs.msg import String  # noqa: E402
 from sbs_msgs.msg import RotorStateArray  # noqa: E402
 from sbs_sim import Aircraft  # noqa: E402
 from sbs_sim.nodes.frames import NO_TF, frame_of, quaternion_of  # noqa: E402
-from sbs_sim.output.robot import Joint, joint_angles, urdf  # noqa: E402
+from sbs_sim.output.robot import Joint, joint_angles, sensor_joints, urdf  # noqa: E402
 
 AIRCRAFT = Aircraft.load("sbs")
 
@@ -28,7 +28,7 @@ def flight(tmp_path_factory):
         made.client.watch("rotors", RotorStateArray)
         made.client.watch("robot_description", String, latched=True)
         made.start("simulator", record="off", components="[simulator, control_mixer]")
-        frames = made.start("frames", rate=20.0)
+        frames = made.start("frames", rate=20.0, **{"imu.position": "[0.1, 0.2, 0.3]"})
         made.client.next("joint_states")
         yield made, frames
 
@@ -58,7 +58,7 @@ def test_joints_are_those_of_the_flight(flight):
 def test_the_description_is_there_for_who_comes_late(flight):
     made, frames = flight
     made.client.until(lambda: made.client.messages["robot_description"], "the description")
-    assert made.client.messages["robot_description"][0].data == urdf(AIRCRAFT)
+    assert made.client.messages["robot_description"][0].data == urdf(AIRCRAFT, sensor_joints([0.1, 0.2, 0.3]))
     if importlib.util.find_spec("tf2_msgs") is None:
         assert NO_TF in frames.output
 
@@ -72,7 +72,7 @@ def test_a_flight_of_another_aircraft_is_reported_and_the_node_lives(flight):
 
 def test_bad_parameters_end_it_with_one_line(flight):
     made, _ = flight
-    for name, value in (("rate", 0.0), ("aircraft", "nothing")):
+    for name, value in (("rate", 0.0), ("aircraft", "nothing"), ("imu.position", "[0.0, 1.0]")):
         process = made.start("frames", **{name: value})
         assert process.wait() == 1
         assert name in process.output or str(value) in process.output

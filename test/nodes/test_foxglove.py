@@ -37,6 +37,7 @@ class Viewer:
         self.info, self.channels, self.services = {}, {}, {}
         self.messages, self.answers, self.status = {}, {}, []
         self._topics, self._count = {}, 0
+        self._wanted = {}  # subscriptions by what the server says to one that comes too early
 
     def close(self):
         self._socket.close()
@@ -62,6 +63,8 @@ class Viewer:
             self.services |= {service["name"]: service for service in said["services"]}
         elif said["op"] == "serviceCallFailure":
             self.answers[said["callId"]] = said["message"]
+        elif said["op"] == "status" and (wanted := self._wanted.get(said["message"])) is not None:
+            self.send(wanted)  # the server tells of a channel a moment before it can be subscribed
         elif said["op"] == "status":
             self.status.append(said["message"])
         return True
@@ -85,8 +88,10 @@ class Viewer:
             self.until(lambda topic=topic: topic in self.channels, topic)
             self._count += 1
             self._topics[self._count], self.messages[topic] = topic, []
-            wanted = {"id": self._count, "channelId": self.channels[topic]["id"]}
-            self.send({"op": "subscribe", "subscriptions": [wanted]})
+            channel = self.channels[topic]["id"]
+            wanted = {"op": "subscribe", "subscriptions": [{"id": self._count, "channelId": channel}]}
+            self._wanted[f"Unknown channel ID: {channel}"] = wanted
+            self.send(wanted)
 
     def next(self, topic, count=1):
         """Messages from now on: stamp [ns] and bytes."""
@@ -210,8 +215,9 @@ def test_controls_fly_the_aircraft(flight, viewer):
     number = viewer.advertise("/controls", "sbs_msgs/msg/Controls")
     sent = controls_message([0.2, 0.01, 0.0, 0.0])
     end = time.monotonic() + PATIENCE
-    while not (viewer.messages["/controls_deg"] and viewer.messages["/target"] and flight.client.messages["/controls"]):
-        assert time.monotonic() < end, viewer.status
+    wanted = viewer.messages["/controls_deg"], viewer.messages["/target"], flight.client.messages["/controls"]
+    while not all(wanted):
+        assert time.monotonic() < end, (list(map(len, wanted)), viewer.status, flight.simulator.output)
         viewer.publish(number, serialize_message(sent))
         target.publish(PoseStamped())
         while viewer.take(0.0):

@@ -105,16 +105,24 @@ def _npz(model: "LinearModel") -> bytes:
                 flat[f"{prefix}{name}"] = np.array(value, dtype=str) if _is_names(value) else np.asarray(value)
 
     add("", _contents(model))
+    return _npz_file(flat)
+
+
+def _npz_file(arrays: dict[str, Any]) -> bytes:
     file = io.BytesIO()
-    np.savez_compressed(file, **flat)
+    np.savez_compressed(file, **arrays)
     return file.getvalue()
 
 
 def _mat(model: "LinearModel") -> bytes:
+    return _mat_file(_contents(model))
+
+
+def _mat_file(content: dict[str, Any]) -> bytes:
     from scipy.io import savemat
 
     file = io.BytesIO()
-    savemat(file, _for_matlab(_contents(model)), long_field_names=True, oned_as="column", do_compression=True)
+    savemat(file, _for_matlab(content), long_field_names=True, oned_as="column", do_compression=True)
     return file.getvalue()
 
 
@@ -195,17 +203,11 @@ def _small_npz(model: "ReducedModel") -> bytes:
         name: np.array(value, dtype=str) if _is_names(value) else np.asarray(value)
         for name, value in _small(model).items()
     }
-    file = io.BytesIO()
-    np.savez_compressed(file, **arrays)
-    return file.getvalue()
+    return _npz_file(arrays)
 
 
 def _small_mat(model: "ReducedModel") -> bytes:
-    from scipy.io import savemat
-
-    file = io.BytesIO()
-    savemat(file, _for_matlab(_small(model)), long_field_names=True, oned_as="column", do_compression=True)
-    return file.getvalue()
+    return _mat_file(_small(model))
 
 
 def _small_json(model: "ReducedModel") -> bytes:

@@ -141,20 +141,7 @@ def _share_blades(rotors: list[dict[str, Any]], rng: np.random.Generator) -> Non
         blades = common or int(rng.integers(FEWEST_BLADES, MOST_BLADES + 1))
         share = rotor["blades"] / blades
         rotor["blades"] = blades
-        chord = rotor["chord"]
-        for key in ("root", "tip"):
-            if key in chord:
-                chord[key] *= share
-        if "values" in chord:
-            chord["values"] = [share * value for value in chord["values"]]
-        for key in ("blade_mass", "blade_inertia", "flap_spring", "lag_spring", "lag_damping"):
-            if key in rotor:
-                rotor[key] *= share
-        if "lag_damper" in rotor:
-            rotor["lag_damper"]["damping"] *= share
-        for key in ("stiffness", "damping"):
-            if "lag_stop" in rotor:
-                rotor["lag_stop"][key] *= share
+        _scale_blades(rotor, share)
         if rng.random() < 0.1:
             rotor["blade_lag_damping"] = rng.uniform(0.5, 1.5, blades).tolist()
 
@@ -227,11 +214,8 @@ def _blade_pairs(data: dict[str, Any], rng: np.random.Generator) -> None:
             _take_two_blades(rotor, rng)
 
 
-def _take_two_blades(rotor: dict[str, Any], rng: np.random.Generator) -> None:
-    """Two blades with the area, mass and stiffness of those that there were."""
-    share = rotor["blades"] / 2
-    rotor["blades"] = 2
-    rotor.pop("blade_lag_damping", None)
+def _scale_blades(rotor: dict[str, Any], share: float) -> None:
+    """Chord, mass and stiffness of each blade, times a share."""
     for key in ("root", "tip", "values"):
         if key in rotor["chord"]:
             rotor["chord"][key] = (share * np.array(rotor["chord"][key])).tolist()
@@ -243,6 +227,14 @@ def _take_two_blades(rotor: dict[str, Any], rng: np.random.Generator) -> None:
     for key in ("stiffness", "damping"):
         if "lag_stop" in rotor:
             rotor["lag_stop"][key] *= share
+
+
+def _take_two_blades(rotor: dict[str, Any], rng: np.random.Generator) -> None:
+    """Two blades with the area, mass and stiffness of those that there were."""
+    share = rotor["blades"] / 2
+    rotor["blades"] = 2
+    rotor.pop("blade_lag_damping", None)
+    _scale_blades(rotor, share)
     if rng.random() < CALM:
         _teeter(rotor, rng)
 

@@ -1013,14 +1013,21 @@ def enter(page, label, value):
     raise AssertionError(f"{label}: {field.input_value()}")
 
 
+def unfold(page, folder):
+    """Open a folder and wait until it is: a list opened while its folder still unfolds stays hidden (Mantine)."""
+    page.get_by_text(folder, exact=True).click()
+    page.wait_for_timeout(50)
+    page.wait_for_function("!document.querySelector('[style*=\"will-change: height\"]')")
+
+
 def test_the_page_sets_what_moving_air_can_do(flying, page):
     """Kinds of turbulence, that of a specification, a gust over distance, and an own gust from a file."""
     made, _, _ = flying
-    page.get_by_text(FOLDER).click()
+    unfold(page, FOLDER)
     for label, option in (("Extent", "field"), ("Spectrum", "von_karman"), ("Profile", "power"),
                           ("Intensity", "MIL-F-8785C, light")):  # fmt: skip
         pick(page, label, option)
-    page.get_by_text("Gust", exact=True).click()
+    unfold(page, "Gust")
     pick(page, "Shape", "ramp over distance")
     for label, value in (("Gust down [m/s]", "2"), ("Length [s or m]", "7")):
         enter(page, label, value)

@@ -46,6 +46,8 @@ class AirPanel:
             self._add_turbulence()
             self._add_gusts()
             self._gui.add_button("Set wind").on_click(lambda _: ask())
+        self._known: dict[int, Any] = {}  # values that were asked for or shown last, by the identities of fields
+        self._take_as_known()
 
     def _vector(self, most: float) -> list[Any]:
         return [self._gui.add_number(f"{name} [m/s]", 0.0, min=-most, max=most, step=0.5) for name in AXES]
@@ -95,14 +97,24 @@ class AirPanel:
         self._file.content = escape(shown)
         self._file.visible = self._remove.visible = bool(text)
 
+    def _take_as_known(self) -> None:
+        following = (*self._wind, self._turbulence, self._specified, self._spectrum, self._extent, self._profile)
+        self._known = {id(field): field.value for field in following}
+
+    def _follow(self, field: Any, value: Any) -> None:
+        """Show a value, unless somebody has changed the field since it was known and has yet to ask for that."""
+        if field.value == self._known[id(field)]:
+            field.value = self._known[id(field)] = value
+
     def fields(self) -> Fields:
-        """Fields of a request; vectors as three numbers.
+        """Fields of a request, which is made now; vectors as three numbers.
 
         Raises
         ------
         SimulationError
             The specification has no turbulence at that height.
         """
+        self._take_as_known()
         sigma = float(self._turbulence.value)
         found: Fields = {
             "velocity": tuple(float(number.value) for number in self._wind),
@@ -128,11 +140,14 @@ class AirPanel:
         self._turbulence.value, self._specified.value = sigma, OWN_SIGMA
 
     def show(self, velocity: Array, turbulence: float, words: Mapping[str, str]) -> None:
-        """The wind that was set: steady, NED [m/s], shape (3,), the largest part of its turbulence, and its kinds."""
+        """The wind that was set: steady, NED [m/s], shape (3,), the largest part of its turbulence, and its kinds.
+
+        What somebody is setting stays as it is.
+        """
         for number, value in zip(self._wind, velocity, strict=True):
-            number.value = round(float(value), 3)
-        if SPECIFIED.get(self._specified.value) is None:
-            self._turbulence.value = round(turbulence, 3)
+            self._follow(number, round(float(value), 3))
+        if self._specified.value == self._known[id(self._specified)] == OWN_SIGMA:
+            self._follow(self._turbulence, round(turbulence, 3))
         for list_, name in zip((self._spectrum, self._extent, self._profile), SHOWN, strict=True):
             if words.get(name) in CHOICES[name]:
-                list_.value = words[name]
+                self._follow(list_, words[name])

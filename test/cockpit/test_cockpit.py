@@ -40,7 +40,7 @@ from sbs_msgs.srv import Reset
 from sbs_sim import Aircraft, linearize, simulate, trim
 from sbs_sim.cockpit import geometry
 from sbs_sim.cockpit.access import refusal
-from sbs_sim.cockpit.air_panel import FOLDER, NO_GUST, OWN_SIGMA
+from sbs_sim.cockpit.air_panel import FOLDER, NO_GUST, OWN_SIGMA, AirPanel
 from sbs_sim.cockpit.charts import PERIOD, WINDOW, ChartHistory, axis_range, body_charts, rotor_charts
 from sbs_sim.cockpit.fly_panel import DOUBLET_LENGTH, DOUBLET_OF, DOUBLET_SIZE, KEYS, LIGHT_TURBULENCE, FlyPanel
 from sbs_sim.cockpit.poles import BODY_POLE_RADIUS, Pole, pole_figure, pole_page
@@ -762,6 +762,29 @@ def test_a_name_that_was_asked_for_is_one_of_this_machine():
     assert not asked("cockpit.example:8080", "cockpit.example")
     assert asked("other.example:8080", "cockpit.example")
     assert not asked(f"{socket.gethostname()}:8080", "0.0.0.0")
+
+
+def test_the_wind_that_blows_is_shown_but_where_somebody_sets_another():
+    """What was asked for comes back late from a busy simulator, and must not undo what has been chosen since."""
+    server = viser.ViserServer(host="127.0.0.1", port=free_port(), verbose=False)
+    try:
+        panel = AirPanel(server, ask=lambda: None, refuse=lambda text: None)
+        chosen = {"turbulence_model": "dryden", "turbulence_extent": "field", "wind_profile": "power"}
+        panel.show(np.array([3.0, 0.0, 0.0]), 0.5, chosen)
+        asked = panel.fields()
+        assert asked["velocity"] == (3.0, 0.0, 0.0)
+        assert asked["turbulence_intensity"] == (0.5, 0.5, 0.5)
+        assert {name: asked[name] for name in chosen} == chosen
+        panel.set_turbulence(0.0)  # as a button does, before the wind comes that was asked for
+        panel.show(np.array([4.0, 0.0, 0.0]), 0.5, chosen | {"wind_profile": "uniform"})
+        asked = panel.fields()
+        assert asked["turbulence_intensity"] == (0.0, 0.0, 0.0)
+        assert asked["velocity"] == (4.0, 0.0, 0.0)
+        assert asked["wind_profile"] == "uniform"
+        panel.show(np.zeros(3), 0.5, chosen)  # the choice was asked for: the next wind is shown again
+        assert panel.fields()["turbulence_intensity"] == (0.5, 0.5, 0.5)
+    finally:
+        server.stop()
 
 
 # --- in a browser -----------------------------------------------------------------------------------------------

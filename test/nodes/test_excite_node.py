@@ -8,7 +8,6 @@ import pytest
 rclpy = pytest.importorskip("rclpy")
 
 from ros_harness import DOMAINS, nanoseconds, world  # noqa: E402
-
 from std_srvs.srv import SetBool  # noqa: E402
 
 from sbs_msgs.msg import ControlValues, SwashplateArray  # noqa: E402

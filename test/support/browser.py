@@ -8,7 +8,7 @@ from typing import Any
 
 CHROMIUM = "chromium"
 SIZE = (1280, 800)
-PATIENCE = 60.0  # s that a page may take on a busy machine
+PATIENCE = 180.0  # s that a page may take on a busy machine
 # WebGL in software; nothing that looks for other machines
 FLAGS = (
     "--use-angle=swiftshader",

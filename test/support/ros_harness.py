@@ -34,7 +34,7 @@ HELD_DOMAINS = 25
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 keep_to_this_machine()
 MEASURED = "COVERAGE_PROCESS_CONFIG" in os.environ  # tools/robustness/coverage_report.py
-PATIENCE = 60.0  # s of wall time; generous, for machines that are busy; DDS alone takes 20 to miss a killed process
+PATIENCE = 120.0  # s of wall time; generous, for machines that are busy; DDS alone takes 20 to miss a killed process
 # s that one look at the topics takes. Always the same: when it changes rclpy begins anew with the first topic, and the
 # last ones get nothing while there is more than can be taken.
 LOOK = 0.01

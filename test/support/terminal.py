@@ -9,7 +9,7 @@ import termios
 import threading
 from typing import Any
 
-PATIENCE = 60.0  # s, generous, for machines that are busy
+PATIENCE = 120.0  # s, generous, for machines that are busy
 
 
 def on_a_terminal(command: list[str], **options: Any) -> tuple[int, str, bytes]:

@@ -14,19 +14,18 @@ from sbs_sim.model.element_gusts import free_gust_at, gust_at
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.section import DEGREE, AirLoads, SectionFlow, SpanFlow, find_section
 from sbs_sim.model.separation import late_lift
-from sbs_sim.model.trigonometry import QUARTER_TURN, TINY, angle_of, small_arcsine
+from sbs_sim.model.trigonometry import TINY, angle_of, small_arcsine
 
 GAUSS = 0.5 / math.sqrt(3.0)  # of an element from its middle: points of the mean with two values
-QUARTER_CIRCLE = 2.0 / math.pi  # over it
 SINE_EIGHTH = 0.38  # less than sin 22.5 deg
 DEEP = 40.0  # exponent whose decay is below the last bit
 NO_LOSS = 1000.0  # over an element of a rotor without this loss
-NEAR_TIP, FAR_INBOARD = 0.05, 1e-3  # decays up to which four terms of the series are enough, and one
-SERIES = (1.0 / 6.0, 3.0 / 40.0, 5.0 / 112.0, 35.0 / 1152.0)  # of z^3 .. z^9 of the arcsine
+NEAR_TIP = 0.05  # decay up to which five terms of the series are enough
 INVERSE_PI = 1.0 / math.pi
+SERIES = tuple(INVERSE_PI * share for share in (1.0 / 6.0, 3.0 / 40.0, 5.0 / 112.0, 35.0 / 1152.0))  # arcsine's, z^3 on
 NO_TIP_LOSS, TIP_LOSS = 1, 2  # of the switch `section_options`
-HALVINGS, TERMS = 6, 14
-FACTORS = tuple((-1.0) ** k / math.factorial(k) for k in range(TERMS + 1))
+HALVINGS = 6
+F0, F1, F2, F3, F4, F5, F6, F7, F8, F9, F10, F11, F12, F13, F14 = ((-1.0) ** k / math.factorial(k) for k in range(15))
 
 
 @kernel
@@ -46,43 +45,62 @@ def span_flow(blade, basis, motion, hub_velocity, induced, gradient):
 def decay(x):
     """e^-x for 0 <= x <= DEEP, beyond which it is that of DEEP."""
     small = minimum(x, DEEP) * (1.0 / 2.0**HALVINGS)
-    found = zeros_like(small) + FACTORS[TERMS]
-    for k in range(TERMS - 1, -1, -1):
-        found = found * small + FACTORS[k]
+    q = small * small + 0.0
+    q2 = q * q + 0.0
+    q4 = q2 * q2 + 0.0
+    # Estrin's order: fewer operations wait for each other than in Horner's
+    low = (F0 + F1 * small + (F2 + F3 * small) * q) + (F4 + F5 * small + (F6 + F7 * small) * q) * q2
+    high = (F8 + F9 * small + (F10 + F11 * small) * q) + (F12 + F13 * small + F14 * q) * q2
+    found = low + high * q4
     for _ in range(HALVINGS):
         found = found * found + 0.0
     return found
 
 
+class TipSeries(NamedTuple):
+    """Powers of a decay in 1 less the factor of an element: 1, 3, 5, 7 and 9."""
+
+    first: Any
+    third: Any
+    fifth: Any
+    seventh: Any
+    ninth: Any
+
+
 @kernel
-def prandtl(e):
-    """Prandtl's factor (2 / pi) arccos e of a decay e = e^-f.
-
-    Inboard, where no tip vortex is near, that is quick, and gives the same bits.
-    """
-    if any_lane(e > SINE_EIGHTH):
-        return QUARTER_CIRCLE * angle_of(sqrt((1.0 - e) * (1.0 + e)), e, 1.0)
-    return QUARTER_CIRCLE * (QUARTER_TURN - small_arcsine(e))
+def tip_series(ratio):
+    """Series of the arcsine for two decays together, the inner one `ratio` times the outer one."""
+    square = ratio * ratio + 0.0
+    cube = square * ratio + 0.0
+    fifth = cube * square + 0.0
+    seventh = fifth * square + 0.0
+    return TipSeries(
+        INVERSE_PI * ratio + INVERSE_PI,
+        SERIES[0] * cube + SERIES[0],
+        SERIES[1] * fifth + SERIES[1],
+        SERIES[2] * seventh + SERIES[2],
+        SERIES[3] * rounded(seventh * square) + SERIES[3],
+    )
 
 
 @kernel
-def mean_factor(outer, inner):
-    """Mean of Prandtl's factor at two decays, the outer one not below the inner.
+def mean_factor(outer, ratio, series):
+    """Mean of Prandtl's factor (2 / pi) arccos e at the decay e = `outer` and at `ratio` times that.
 
-    Where both are small, which is nearly everywhere, by the series of the arcsine: what it leaves out is below the
-    last bit.
+    Near the tip by the angle whose cosine and sine are those of the sum. Where both decays are small, which is nearly
+    everywhere, by the series: what it leaves out is below the last bit.
     """
     if any_lane(outer > NEAR_TIP):
-        return rounded(0.5 * (prandtl(outer) + prandtl(inner)))
-    p, q = outer * outer + 0.0, inner * inner + 0.0
-    first, second = rounded(outer * p), rounded(inner * q)
-    if any_lane(outer > FAR_INBOARD):
-        outer_share = SERIES[0] + p * (SERIES[1] + p * (SERIES[2] + p * SERIES[3]))
-        inner_share = SERIES[0] + q * (SERIES[1] + q * (SERIES[2] + q * SERIES[3]))
-        beyond = first * outer_share + second * inner_share
-    else:
-        beyond = rounded(SERIES[0] * (first + second))
-    return 1.0 - INVERSE_PI * ((outer + inner) + beyond)
+        inner = outer * ratio + 0.0
+        if any_lane(outer > SINE_EIGHTH):
+            outer_sine, inner_sine = sqrt((1.0 - outer) * (1.0 + outer)), sqrt((1.0 - inner) * (1.0 + inner))
+            sine = outer_sine * inner + rounded(inner_sine * outer)
+            cosine = outer * inner - rounded(outer_sine * inner_sine)
+            return rounded(INVERSE_PI * angle_of(sine, cosine, 1.0))
+        return 1.0 - INVERSE_PI * (small_arcsine(outer) + small_arcsine(inner))
+    p = outer * outer + 0.0
+    share = series.first + p * (series.third + p * (series.fifth + p * (series.seventh + p * series.ninth)))
+    return 1.0 - outer * share
 
 
 @kernel
@@ -94,11 +112,12 @@ def set_tip_factors(blade, strip, through):
     tip = blade.rotor_speed * blade.radius
     rate = 0.5 * blade.tip_blades * sqrt(tip * tip + through * through) / (abs(through) + TINY)
     over_element = select(blade.tip_blades > 0.0, rate * blade.element_width, NO_LOSS)
-    outer, inner = decay(over_element * (0.5 - GAUSS)), decay(over_element * (0.5 + GAUSS))
-    step = decay(over_element)
+    outer, ratio = decay(over_element * (0.5 - GAUSS)), decay(over_element * (2.0 * GAUSS))
+    step = rounded(outer * outer) * ratio + 0.0
+    series = tip_series(ratio)
     for k in range(strip.shape[0]):
-        strip[strip.shape[0] - 1 - k].tip_factor = mean_factor(outer, inner)
-        outer, inner = outer * step + 0.0, inner * step + 0.0
+        strip[strip.shape[0] - 1 - k].tip_factor = mean_factor(outer, ratio, series)
+        outer = outer * step + 0.0
 
 
 class GustPowers(NamedTuple):

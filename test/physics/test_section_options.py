@@ -9,7 +9,7 @@ from test_dynamics import largest_error, stand
 from sbs_sim.lanes import as_quads
 from sbs_sim.model import records as R
 from sbs_sim.model.kernel import entry
-from sbs_sim.model.section_options import mean_factor
+from sbs_sim.model.section_options import mean_factor, tip_series
 
 OPTIONS = {
     "tip loss": {"tip_loss_model": "prandtl"},
@@ -77,19 +77,21 @@ def test_elements_have_the_mean_of_prandtls_factor():
 
 
 @entry
-def mean_factors(decays, out):
-    """Mean factors, shape (n, 4), of outer and inner decays, (n, 2, 4)."""
-    given, found = as_quads(decays), as_quads(out)
+def mean_factors(given, out):
+    """Mean factors, shape (n, 4), of outer decays and of the ratios of the inner ones to them, (n, 2, 4)."""
+    decays, found = as_quads(given), as_quads(out)
     for i in range(out.shape[0]):
-        found[i] = mean_factor(given[i, 0], given[i, 1])
+        found[i] = mean_factor(decays[i, 0], decays[i, 1], tip_series(decays[i, 1]))
 
 
-def test_the_series_inboard_is_the_arccosine_to_the_last_bits():
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.6, 1.0])
+def test_the_mean_of_two_decays_is_that_of_the_arccosines(ratio):
     outer = np.concatenate([np.geomspace(1e-18, 1.0, 4000), 0.05 + np.linspace(-1e-9, 1e-9, 8)]).reshape(-1, 4)
-    decays, out = np.stack([outer, 0.6 * outer], axis=1), np.empty_like(outer)
+    decays, out = np.stack([outer, np.full_like(outer, ratio)], axis=1), np.empty_like(outer)
     mean_factors(decays, out)
-    np.testing.assert_allclose(out, np.arccos(decays).mean(axis=1) * 2 / np.pi, rtol=0, atol=4e-16)
-    assert (out[outer < 1e-16] == 1.0).all()
+    exact = np.arccos(np.stack([outer, ratio * outer])).mean(axis=0) * 2 / np.pi
+    np.testing.assert_allclose(out, exact, rtol=0, atol=4e-16)
+    assert (out[outer < 5e-17] == 1.0).all()
 
 
 def profile_power(folder, mu, **rotor):

@@ -1,4 +1,4 @@
-"""Call every service of simulation_interfaces that the simulator offers, and print a table of the answers.
+"""Call every service and the action of simulation_interfaces that the simulator offers; print a table of the answers.
 
     ./run python tools/check_simulation_interfaces.py [CHECKOUT]
 
@@ -22,6 +22,7 @@ BUILT = ROOT / ".cache" / "simulation_interfaces"
 PACKAGE = "simulation_interfaces"
 READY = "SBS_SIM_INTERFACES_READY"  # set in the environment of the second start
 WIDTH = 60  # characters of a message in the table
+CANCELLED = 1_000_000  # steps of a goal that is cancelled after the first ones
 
 
 def build(checkout: Path) -> Path:
@@ -44,8 +45,8 @@ def start_again(prefix: Path) -> None:
     os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | paths | {READY: "1"})
 
 
-def questions(s: Any, m: Any, motion: Any) -> Iterator[tuple[Any, str, dict[str, Any], int]]:
-    """Services with their requests in the order in which they are called, and the result code that is due."""
+def questions(s: Any, a: Any, m: Any, motion: Any) -> Iterator[tuple[Any, str, dict[str, Any], int]]:
+    """Services and actions with their requests in the order of the calls, and the result code that is due."""
     result, state = m.Result, m.SimulationState
 
     def to(value: int, code: int) -> tuple[Any, str, dict[str, Any], int]:
@@ -68,6 +69,9 @@ def questions(s: Any, m: Any, motion: Any) -> Iterator[tuple[Any, str, dict[str,
     yield s.StepSimulation, "step_simulation", {"steps": 1}, ok
     yield s.StepSimulation, "step_simulation", {"steps": 10}, ok
     yield s.StepSimulation, "step_simulation", {"steps": 0}, result.RESULT_OPERATION_FAILED
+    yield a.SimulateSteps, "simulate_steps", {"steps": 20}, ok
+    yield a.SimulateSteps, "simulate_steps", {"steps": 0}, result.RESULT_OPERATION_FAILED
+    yield a.SimulateSteps, "simulate_steps", {"steps": CANCELLED}, result.RESULT_OPERATION_FAILED
     yield s.GetEntities, "get_entities", {}, ok
     yield s.GetEntities, "get_entities", {"filters": m.EntityFilters(filter="^x")}, ok
     yield s.GetEntities, "get_entities", {"filters": m.EntityFilters(filter="(")}, result.RESULT_OPERATION_FAILED
@@ -86,6 +90,22 @@ def questions(s: Any, m: Any, motion: Any) -> Iterator[tuple[Any, str, dict[str,
     yield to(state.STATE_NO_WORLD, result.RESULT_FEATURE_UNSUPPORTED)
     yield to(77, answers.INCORRECT_TRANSITION)
     yield to(state.STATE_QUITTING, ok)
+
+
+def ask(client: Any, kind: Any, name: str, request: dict[str, Any]) -> Any:
+    """Response of a service, or result of a goal, whose feedback must count every step."""
+    if not hasattr(kind, "Goal"):
+        return client.call(kind, name, **request)
+    goal, steps = client.send_goal(kind, name, **request), request["steps"]
+    if steps == CANCELLED:
+        client.until(lambda: goal.feedback, "feedback of a goal")
+        goal.cancel()
+    _, result = goal.end()
+    client.spin(0.5)
+    told = [(one.completed_steps, one.remaining_steps) for one in goal.feedback]
+    assert told == [(done, steps - done) for done in range(1, len(told) + 1)], told
+    assert steps == CANCELLED or len(told) == steps, told
+    return result
 
 
 def content(response: Any) -> str:
@@ -129,6 +149,7 @@ def main() -> int:
     if options.checkout is not None and READY not in os.environ:
         start_again(build(options.checkout.resolve()))
     sys.path.insert(0, str(ROOT / "test" / "support"))
+    import simulation_interfaces.action as a
     import simulation_interfaces.msg as m
     import simulation_interfaces.srv as s
     from ament_index_python.packages import get_package_share_path
@@ -146,8 +167,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder, world(next(DOMAINS), Path(folder)) as made:
         log = Path(folder) / "flight.mcap"
         simulator = made.start("simulator", record=log, simulation_interfaces=True, altitude=10.0)
-        for kind, name, request, due in questions(s, m, motion):
-            response = made.client.call(kind, name, **request)
+        for kind, name, request, due in questions(s, a, m, motion):
+            response = ask(made.client, kind, name, request)
             code = response.result.result if hasattr(response, "result") else due
             said = response.result.error_message[:WIDTH] if hasattr(response, "result") else ""
             wrong += code != due

@@ -1,4 +1,4 @@
-"""Services of the package simulation_interfaces, by which tools drive any simulator.
+"""Services and the action of the package simulation_interfaces, by which tools drive any simulator.
 
 They say and do what `pause`, `step` and `reset` do. There is one entity, the aircraft. Simulation time never goes back,
 so a reset of the time is refused. Result codes are those of the package; a refusal changes nothing.
@@ -7,11 +7,13 @@ so a reset of the time is refused. Result codes are those of the package; a refu
 import os
 import re
 import signal
+import threading
 import traceback
 from collections.abc import Callable
 from typing import Any
 
 from geometry_msgs.msg import Pose, Twist
+from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 
 from sbs_sim import checks
@@ -23,22 +25,24 @@ from sbs_sim.nodes.conversions import FRAME_ODOM, to_time
 from sbs_sim.nodes.entity_state import motion_of, moved
 from sbs_sim.nodes.number_fields import check_numbers, hint
 from sbs_sim.nodes.qos import SERVICE_QOS
+from sbs_sim.nodes.threaded_action import ThreadedActionServer
 
 try:
-    from simulation_interfaces import msg, srv
+    from simulation_interfaces import action, msg, srv
 except ImportError as error:  # modules are also imported where nobody asks for the services
-    msg = srv = None
+    action = msg = srv = None
     MISSING = str(error)
 else:
     MISSING = ""
 
 MAX_FILTER = 1000  # characters
+MAX_ACTION_STEPS = 1_000_000  # of a goal, which others do not wait for and which can be cancelled
 FRAMES = ("", "world", FRAME_ODOM)
 FEATURES = (
     *("ENTITY_CATEGORIES", "ENTITY_INFO_GETTING", "ENTITY_STATE_GETTING", "ENTITY_STATE_SETTING"),
     *("SIMULATION_RESET", "SIMULATION_RESET_STATE"),
     *("SIMULATION_STATE_GETTING", "SIMULATION_STATE_SETTING", "SIMULATION_STATE_PAUSE"),
-    *("STEP_SIMULATION_SINGLE", "STEP_SIMULATION_MULTIPLE"),
+    *("STEP_SIMULATION_SINGLE", "STEP_SIMULATION_MULTIPLE", "STEP_SIMULATION_ACTION"),
 )
 STOPPED, PLAYING, PAUSED, QUITTING = STATES = range(4)  # SimulationState
 WORLDS = (4, 5)  # STATE_NO_WORLD, STATE_LOADING_WORLD, which version 1 of the package does not have
@@ -63,6 +67,8 @@ class SimulationServices:
         At its start, to which a reset returns.
     loop : FlightLoop
         That flies it.
+    threads : list of Thread
+        Where those of the action are kept.
 
     Raises
     ------
@@ -70,7 +76,7 @@ class SimulationServices:
         The package is not installed.
     """
 
-    def __init__(self, node: Node, simulation: Simulation, loop: FlightLoop) -> None:
+    def __init__(self, node: Node, simulation: Simulation, loop: FlightLoop, threads: list[threading.Thread]) -> None:
         if MISSING:
             raise SimulationError(
                 "parameter simulation_interfaces = true: allowed where the package of that name is installed: "
@@ -89,6 +95,13 @@ class SimulationServices:
         self._serve(srv.GetEntityInfo, "get_entity_info", self._entity_info)
         self._serve(srv.GetEntityState, "get_entity_state", self._entity_state)
         self._serve(srv.SetEntityState, "set_entity_state", self._set_entity_state)
+        self._action = ThreadedActionServer(
+            node, action.SimulateSteps, "simulate_steps", self._simulate_steps, threads, _is_ok
+        )
+
+    def destroy(self) -> None:
+        """End the action, which rclpy forgets with its node."""
+        self._action.destroy()
 
     def _serve(self, kind: Any, name: str, act: Callable[[Any, Any], None]) -> None:
         def answer(request: Any, response: Any) -> Any:
@@ -153,6 +166,27 @@ class SimulationServices:
 
     def _step(self, request: Any, _: Any) -> None:
         self._loop.step(checks.integer("steps", request.steps, 1, MAX_STEP_TICKS, SimulationError))
+
+    def _simulate_steps(self, goal: ServerGoalHandle) -> Any:
+        """Fly step by step as a goal asks for, and tell of each; in a thread of its own."""
+        done = 0
+
+        def fly(request: Any, _: Any) -> None:
+            nonlocal done
+            steps = checks.integer("steps", request.steps, 1, MAX_ACTION_STEPS, SimulationError)
+            while done < steps and not goal.is_cancel_requested:
+                self._loop.step(1)
+                done += 1
+                told = action.SimulateSteps.Feedback(completed_steps=done, remaining_steps=steps - done)
+                goal.publish_feedback(told)
+            if done < steps:
+                raise SimulationError("cancelled")
+
+        result = action.SimulateSteps.Result()
+        code, text = self._outcome(fly, goal.request, result)
+        told = f"{text}, after {done} of {goal.request.steps} steps" if done and text else text
+        result.result.result, result.result.error_message = code, told
+        return result
 
     def _reset(self, request: Any, _: Any) -> None:
         if request.scope != srv.ResetSimulation.Request.SCOPE_STATE:
@@ -222,6 +256,10 @@ class SimulationServices:
         if twist is not None:
             state[:BODY_SIZE] = moved(state[:BODY_SIZE], twist=twist)
         return state
+
+
+def _is_ok(result: Any) -> bool:
+    return bool(result.result.result == msg.Result.RESULT_OK)
 
 
 def is_meant(filters: Any, name: str) -> bool:

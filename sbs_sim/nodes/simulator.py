@@ -182,10 +182,11 @@ class Simulator(Component):
         self.create_service(Reset, "reset", self._on_reset, qos_profile=SERVICE_QOS)
         self.create_service(SetWind, "set_wind", self._on_set_wind, qos_profile=SERVICE_QOS)
         self.create_service(EngineFailure, "engine_failure", self._on_engine_failure, qos_profile=SERVICE_QOS)
+        self._standard_services: Any = None
         if values["simulation_interfaces"]:
             from sbs_sim.nodes.simulation_services import SimulationServices  # here: most do without
 
-            SimulationServices(self, simulation, self.loop)
+            self._standard_services = SimulationServices(self, simulation, self.loop, self.workers)
         self.add_on_set_parameters_callback(self._on_parameters)
 
     def begin(self) -> None:
@@ -351,6 +352,12 @@ class Simulator(Component):
     def stop(self) -> None:
         """End the flight; waiting callers get an error."""
         self.loop.stop()
+
+    def destroy_node(self) -> None:
+        """End the action of the standard services, which rclpy forgets, then the node."""
+        if self._standard_services is not None:
+            self._standard_services.destroy()
+        super().destroy_node()
 
     def finish(self) -> None:
         """End the publishing, then the log."""

@@ -26,12 +26,14 @@ class ThreadedActionServer(ActionServer):
     ----------
     node : Node
     kind : type
-        Of the action; its result has the field `success`.
+        Of the action.
     name : str
     carry_out : callable
         Takes the goal's handle and returns the result.
     threads : list of Thread
         Where the threads are kept.
+    succeeded : callable, optional
+        Whether a goal with this result has succeeded; by default its field `success` says so.
     """
 
     def __init__(
@@ -41,6 +43,7 @@ class ThreadedActionServer(ActionServer):
         name: str,
         carry_out: Callable[[ServerGoalHandle], Any],
         threads: list[threading.Thread],
+        succeeded: Callable[[Any], bool] = lambda result: bool(result.success),
     ) -> None:
         super().__init__(
             node,
@@ -50,7 +53,7 @@ class ThreadedActionServer(ActionServer):
             cancel_callback=lambda _: CancelResponse.ACCEPT,
             result_timeout=RESULT_TIMEOUT,
         )
-        self._carry_out, self._threads = carry_out, threads
+        self._carry_out, self._threads, self._succeeded = carry_out, threads, succeeded
         self._results: queue.SimpleQueue[tuple[ServerGoalHandle, Any]] = queue.SimpleQueue()
         self._ready = node.create_guard_condition(self._hand_over)
 
@@ -70,14 +73,13 @@ class ThreadedActionServer(ActionServer):
         with contextlib.suppress(queue.Empty):
             while True:
                 goal, result = self._results.get_nowait()
-                super().notify_execute(goal, lambda goal, result=result: _close(goal, result))
+                super().notify_execute(goal, lambda goal, result=result: self._close(goal, result))
 
-
-def _close(goal: ServerGoalHandle, result: Any) -> Any:
-    if result.success:
-        goal.succeed()
-    elif goal.is_cancel_requested:
-        goal.canceled()
-    else:
-        goal.abort()
-    return result
+    def _close(self, goal: ServerGoalHandle, result: Any) -> Any:
+        if self._succeeded(result):
+            goal.succeed()
+        elif goal.is_cancel_requested:
+            goal.canceled()
+        else:
+            goal.abort()
+        return result

@@ -120,7 +120,7 @@ def modes(a: Array, state_names: Sequence[str]) -> tuple[Mode, ...]:
     """
     _check_shape(a, state_names)
     states = _states(tuple(state_names))
-    speeds = {rotor: _speed(a, states, rotor) for rotor in states.sizes}
+    speeds = {rotor: _speed(a, states, rotor) for rotor in states.kinds}
     named = _named(_Found(_unnamed(a, state_names)), speeds, states)
     return tuple(sorted(_unique(named), key=lambda mode: (mode.frequency, mode.name)))
 
@@ -290,16 +290,20 @@ class _States:
         return {family: self.where(family=family) for family in dict.fromkeys(part.family for part in self.parts)}
 
     @cached_property
-    def sizes(self) -> dict[int, int]:
-        """Number of states of each rotor."""
-        return {rotor: len(self.where(rotor=rotor)) for rotor in sorted({part.rotor for part in self.parts} - {-1})}
+    def kinds(self) -> dict[int, tuple[tuple[str, int, bool], ...]]:
+        """Family and harmonic of the states of each rotor, and whether they are rates."""
+        found: dict[int, list[tuple[str, int, bool]]] = {}
+        for part in sorted(self.parts, key=lambda part: part.rotor):
+            if part.rotor >= 0:
+                found.setdefault(part.rotor, []).append((part.family, part.harmonic, part.is_rate))
+        return {rotor: tuple(sorted(kinds)) for rotor, kinds in found.items()}
 
     @cached_property
     def turning(self) -> dict[int, list[Indices]]:
         """Indices of the rates of the first harmonic of flap and of lag of each rotor."""
         pairs = {
             rotor: [self.where(family=family, harmonic=1, rotor=rotor, is_rate=True) for family in ("flap", "lag")]
-            for rotor in self.sizes
+            for rotor in self.kinds
         }
         return {rotor: [pair for pair in found if len(pair) == 2] for rotor, found in pairs.items()}
 
@@ -361,13 +365,13 @@ def _rotor_group(states: _States, family: str, rotors: tuple[int, ...]) -> _Grou
 
 
 def _alike_rotors(speeds: Mapping[int, float], states: _States) -> list[tuple[int, ...]]:
-    """Rotors of one number of states and one speed, which may share modes."""
+    """Rotors with states of the same kinds and one speed, which may share modes."""
     found: list[list[int]] = []
     for rotor, speed in speeds.items():
         for members in found:
             other = speeds[members[0]]
             # a speed that is not known is no difference
-            if states.sizes[rotor] == states.sizes[members[0]] and not abs(speed - other) > SAME_SPEED * other:
+            if states.kinds[rotor] == states.kinds[members[0]] and not abs(speed - other) > SAME_SPEED * other:
                 members.append(rotor)
                 break
         else:
@@ -621,7 +625,7 @@ def _rotor_label(
     if group.family != "inflow" and harmonic > 0:
         name = f"{_way(mode, harmonic * speeds[owner], group.by_both[owner, harmonic])} {name}".strip()
     having = (owner,) if shares[owner] > OWNED * sum(shares.values()) else group.rotors
-    name += _rotors_suffix(having, len(states.sizes))
+    name += _rotors_suffix(having, len(states.kinds))
     if len(having) == 2:
         first, second = (mode.vector[group.by_both[rotor, harmonic]] for rotor in having)
         name += ", symmetric" if np.vdot(first, second).real > 0.0 else ", antisymmetric"

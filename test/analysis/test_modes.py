@@ -568,3 +568,18 @@ def test_unknown_states_are_refused(name):
 def test_wrong_shape_is_refused():
     with pytest.raises(ValueError, match="2 state names for a matrix of shape"):
         modes(np.zeros((3, 3)), ["u", "w"])
+
+
+def test_rotors_with_as_many_states_of_other_kinds_are_not_alike():
+    """Six blades have as many states as four with the two of an unsteady airfoil each."""
+    layout = StateLayout(blades=(6, 4), wakes=(False, True))
+    names = layout.linear_names
+    parts = [part_of(name) for name in names]
+    sizes = [sum(part.rotor == rotor for part in parts) for rotor in (0, 1)]
+    assert sizes[0] == sizes[1]
+    found = modes(np.diag(-1.0 - np.arange(len(names))), names)
+    by_pole = {round(-1.0 - mode.pole.real): mode for mode in found}
+    for i, part in enumerate(parts):
+        mode = by_pole[i]
+        assert mode.family == part.family, names[i]
+        assert mode.rotors in ((), (part.rotor + 1,)), names[i]

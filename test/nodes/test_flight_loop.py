@@ -113,14 +113,19 @@ def falling(sbs):
 
 @pytest.mark.parametrize("pace", [0.5, 1.0])
 def test_flight_keeps_pace_with_the_clock(simulation, pace):
+    """Never faster; on a busy machine it is slower for a while."""
     with flying(simulation, real_time_factor=pace) as (_, reader):
         wait_until(lambda: len(reader.reports) > 2)
-        started, first = time.monotonic(), reader.newest().time
-        time.sleep(1.2)
-        flown = (reader.newest().time - first) / (time.monotonic() - started)
-        measured = reader.newest().real_time_factor
-    assert 0.5 * pace < flown < 1.5 * pace
-    assert 0.5 * pace < measured < 1.5 * pace
+
+        def kept():
+            started, first = time.monotonic(), reader.newest().time
+            time.sleep(1.2)
+            flown = (reader.newest().time - first) / (time.monotonic() - started)
+            measured = reader.newest().real_time_factor
+            assert max(flown, measured) < 1.5 * pace
+            return min(flown, measured) > 0.5 * pace
+
+        wait_until(kept)
 
 
 def test_a_change_of_pace_acts_at_once(simulation):

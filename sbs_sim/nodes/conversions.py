@@ -167,6 +167,22 @@ def wind_of(request: SetWind.Request, snapshot: Snapshot, aircraft: Aircraft) ->
     )
 
 
+def wind_words(wind: Wind) -> str:
+    """What blows, in a line: a value that was forgotten, or taken from the flight, shows."""
+    parts = []
+    if any(wind.velocity):
+        parts.append(f"{math.hypot(*wind.velocity):.3g} m/s")
+    if any(wind.gust):
+        parts.append(f"a gust of {math.hypot(*wind.gust):.3g} m/s")
+    if wind.own_gust is not None:
+        parts.append(f"an own gust over {wind.own_gust.over}")
+    if any(wind.turbulence_intensity):
+        most = f"of up to {max(wind.turbulence_intensity):.3g} m/s"
+        passing = f"passing at {wind.turbulence_airspeed:.3g} m/s"
+        parts.append(f"turbulence ({wind.turbulence_model}, {wind.turbulence_extent}) {most}, {passing}")
+    return ", ".join(parts) or "still air"
+
+
 def prepare_field(request: SetWind.Request) -> None:
     """Make the field of turbulence of a request, which takes some tenths of a second, while the flight goes on.
 

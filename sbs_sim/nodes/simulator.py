@@ -22,6 +22,7 @@ from sbs_sim.errors import SbsError, SimulationError, TrimError
 from sbs_sim.flight.contact import state_on_ground
 from sbs_sim.flight.gust_file import read_gust
 from sbs_sim.flight.gust_standards import specified_turbulence
+from sbs_sim.flight.records import Snapshot
 from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP_DEG, FREE_METHOD, METHOD, METHODS, Simulation
 from sbs_sim.flight.stitched import StitchedModel
 from sbs_sim.flight.stitched_file import load
@@ -34,7 +35,7 @@ from sbs_sim.model.wind import MAX_WIND, MIN_TURBULENCE_AIRSPEED, RATES, Wind
 from sbs_sim.nodes.command_monitor import CommandMonitor
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.control_mixer import ControlMixer
-from sbs_sim.nodes.conversions import point_array, prepare_field, swashplate_array, wind_of
+from sbs_sim.nodes.conversions import point_array, prepare_field, swashplate_array, wind_of, wind_words
 from sbs_sim.nodes.parameters import DEFAULT_GROUND, MAX_PORT, Parameter, declare, ground_altitude
 from sbs_sim.nodes.process import run
 from sbs_sim.nodes.qos import COMMAND_QOS, SERVICE_QOS
@@ -322,11 +323,20 @@ class Simulator(Component):
         return self.answer(response, reset, "reset", request)
 
     def _on_set_wind(self, request: SetWind.Request, response: SetWind.Response) -> SetWind.Response:
+        made: list[Wind] = []
+
+        def make(now: Snapshot) -> Wind:
+            made.append(wind_of(request, now, self.aircraft))
+            return made[-1]
+
         def set_wind() -> None:
             prepare_field(request)
-            self.loop.set_wind(lambda now: wind_of(request, now, self.aircraft))
+            self.loop.set_wind(make)
 
-        return self.answer(response, set_wind, "wind set", request)
+        response = self.answer(response, set_wind, "", request)
+        if response.success:
+            response.message = f"wind set: {wind_words(made[-1])}"
+        return response
 
     def _on_engine_failure(
         self, request: EngineFailure.Request, response: EngineFailure.Response

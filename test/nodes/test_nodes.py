@@ -239,15 +239,20 @@ def test_reset_to_a_condition_and_to_a_state(client):
 
 def test_wind_moves_the_aircraft_and_a_gust_passes(client):
     assert client.call(SetBool, "pause", data=True).success
-    assert client.call(SetWind, "set_wind", gust=Vector3(z=-4.0), gust_duration=0.5).success
+    answer = client.call(SetWind, "set_wind", gust=Vector3(z=-4.0), gust_duration=0.5)
+    assert (answer.success, answer.message) == (True, "wind set: a gust of 4 m/s")
     _, risen = stepped(client, 60)
     assert risen.velocity.z < -0.1  # air that goes up takes the aircraft along
     answer = client.call(
         SetWind, "set_wind", velocity=Vector3(x=5.0), turbulence_intensity=Vector3(x=1.0, y=1.0, z=0.5)
     )
     assert answer.success
+    said = r"wind set: 5 m/s, turbulence \(dryden, point\) of up to 1 m/s, passing at (4\.9\d*|5\S*) m/s"
+    assert re.fullmatch(said, answer.message), answer.message
     _, state = stepped(client, 100)
     assert state.velocity.x > 0.05
+    forgotten = client.call(SetWind, "set_wind", turbulence_length=20.0)
+    assert (forgotten.success, forgotten.message) == (True, "wind set: still air")
 
 
 @pytest.mark.parametrize(

@@ -102,13 +102,16 @@ def _npz(model: "LinearModel") -> bytes:
             if isinstance(value, Mapping):
                 add(f"{prefix}{name}.", value)
             else:
-                flat[f"{prefix}{name}"] = np.array(value, dtype=str) if _is_names(value) else np.asarray(value)
+                flat[f"{prefix}{name}"] = value
 
     add("", _contents(model))
     return _npz_file(flat)
 
 
-def _npz_file(arrays: dict[str, Any]) -> bytes:
+def _npz_file(content: dict[str, Any]) -> bytes:
+    arrays: dict[str, Any] = {
+        name: np.array(value, dtype=str) if _is_names(value) else np.asarray(value) for name, value in content.items()
+    }
     file = io.BytesIO()
     np.savez_compressed(file, **arrays)
     return file.getvalue()
@@ -199,11 +202,7 @@ def _small(model: "ReducedModel") -> dict[str, Any]:
 
 
 def _small_npz(model: "ReducedModel") -> bytes:
-    arrays: dict[str, Any] = {
-        name: np.array(value, dtype=str) if _is_names(value) else np.asarray(value)
-        for name, value in _small(model).items()
-    }
-    return _npz_file(arrays)
+    return _npz_file(_small(model))
 
 
 def _small_mat(model: "ReducedModel") -> bytes:

@@ -292,11 +292,12 @@ class _States:
     @cached_property
     def kinds(self) -> dict[int, tuple[tuple[str, int, bool], ...]]:
         """Family and harmonic of the states of each rotor, and whether they are rates."""
-        found: dict[int, list[tuple[str, int, bool]]] = {}
-        for part in sorted(self.parts, key=lambda part: part.rotor):
-            if part.rotor >= 0:
-                found.setdefault(part.rotor, []).append((part.family, part.harmonic, part.is_rate))
-        return {rotor: tuple(sorted(kinds)) for rotor, kinds in found.items()}
+        return {
+            rotor: tuple(
+                sorted((part.family, part.harmonic, part.is_rate) for part in self.parts if part.rotor == rotor)
+            )
+            for rotor in sorted({part.rotor for part in self.parts} - {-1})
+        }
 
     @cached_property
     def turning(self) -> dict[int, list[Indices]]:

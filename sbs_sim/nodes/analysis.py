@@ -66,16 +66,11 @@ class Analysis(Component):
         self._linear_model = RecordedPublisher(self, LinearModel, "linear_model", LATCHED_QOS, log)
         self.create_service(Trim, "trim", self._on_trim, qos_profile=SERVICE_QOS)
         self.create_service(Linearize, "linearize", self._on_linearize, qos_profile=SERVICE_QOS)
-        self._sweeps = ThreadedActionServer(self, Sweep, "sweep", self._sweep, self.workers)
+        ThreadedActionServer(self, Sweep, "sweep", self._sweep)
 
     def stop(self) -> None:
         """End a sweep after the point that it is at."""
         self._ending.set()
-
-    def destroy_node(self) -> None:
-        """End the action, which rclpy forgets, then the node."""
-        self._sweeps.destroy()
-        super().destroy_node()
 
     def _now(self) -> float:
         """Simulation time [s]; 0 where nothing flies."""

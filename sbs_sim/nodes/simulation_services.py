@@ -7,20 +7,19 @@ so a reset of the time is refused. Result codes are those of the package; a refu
 import os
 import re
 import signal
-import threading
 import traceback
 from collections.abc import Callable
 from typing import Any
 
 from geometry_msgs.msg import Pose, Twist
 from rclpy.action.server import ServerGoalHandle
-from rclpy.node import Node
 
 from sbs_sim import checks
 from sbs_sim.errors import SbsError, SimulationError
 from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight_loop import MAX_STEP_TICKS, FlightLoop
 from sbs_sim.model.state import BODY_SIZE
+from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.conversions import FRAME_ODOM, to_time
 from sbs_sim.nodes.entity_state import motion_of, moved
 from sbs_sim.nodes.number_fields import check_numbers, hint
@@ -62,13 +61,11 @@ class SimulationServices:
 
     Parameters
     ----------
-    node : Node
+    node : Component
     simulation : Simulation
         At its start, to which a reset returns.
     loop : FlightLoop
         That flies it.
-    threads : list of Thread
-        Where those of the action are kept.
 
     Raises
     ------
@@ -76,7 +73,7 @@ class SimulationServices:
         The package is not installed.
     """
 
-    def __init__(self, node: Node, simulation: Simulation, loop: FlightLoop, threads: list[threading.Thread]) -> None:
+    def __init__(self, node: Component, simulation: Simulation, loop: FlightLoop) -> None:
         if MISSING:
             raise SimulationError(
                 "parameter simulation_interfaces = true: allowed where the package of that name is installed: "
@@ -95,13 +92,7 @@ class SimulationServices:
         self._serve(srv.GetEntityInfo, "get_entity_info", self._entity_info)
         self._serve(srv.GetEntityState, "get_entity_state", self._entity_state)
         self._serve(srv.SetEntityState, "set_entity_state", self._set_entity_state)
-        self._action = ThreadedActionServer(
-            node, action.SimulateSteps, "simulate_steps", self._simulate_steps, threads, _is_ok
-        )
-
-    def destroy(self) -> None:
-        """End the action, which rclpy forgets with its node."""
-        self._action.destroy()
+        ThreadedActionServer(node, action.SimulateSteps, "simulate_steps", self._simulate_steps, _is_ok)
 
     def _serve(self, kind: Any, name: str, act: Callable[[Any, Any], None]) -> None:
         def answer(request: Any, response: Any) -> Any:

@@ -22,7 +22,6 @@ from sbs_sim.errors import SbsError, SimulationError, TrimError
 from sbs_sim.flight.contact import state_on_ground
 from sbs_sim.flight.gust_file import read_gust
 from sbs_sim.flight.gust_standards import specified_turbulence
-from sbs_sim.flight.records import Snapshot
 from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP_DEG, FREE_METHOD, METHOD, METHODS, Simulation
 from sbs_sim.flight.stitched import StitchedModel
 from sbs_sim.flight.stitched_file import load
@@ -183,11 +182,10 @@ class Simulator(Component):
         self.create_service(Reset, "reset", self._on_reset, qos_profile=SERVICE_QOS)
         self.create_service(SetWind, "set_wind", self._on_set_wind, qos_profile=SERVICE_QOS)
         self.create_service(EngineFailure, "engine_failure", self._on_engine_failure, qos_profile=SERVICE_QOS)
-        self._standard_services: Any = None
         if values["simulation_interfaces"]:
             from sbs_sim.nodes.simulation_services import SimulationServices  # here: most do without
 
-            self._standard_services = SimulationServices(self, simulation, self.loop, self.workers)
+            SimulationServices(self, simulation, self.loop)
         self.add_on_set_parameters_callback(self._on_parameters)
 
     def begin(self) -> None:
@@ -323,19 +321,13 @@ class Simulator(Component):
         return self.answer(response, reset, "reset", request)
 
     def _on_set_wind(self, request: SetWind.Request, response: SetWind.Response) -> SetWind.Response:
-        made: list[Wind] = []
-
-        def make(now: Snapshot) -> Wind:
-            made.append(wind_of(request, now, self.aircraft))
-            return made[-1]
-
         def set_wind() -> None:
             prepare_field(request)
-            self.loop.set_wind(make)
+            self.loop.set_wind(lambda now: wind_of(request, now, self.aircraft))
 
         response = self.answer(response, set_wind, "", request)
         if response.success:
-            response.message = f"wind set: {wind_words(made[-1])}"
+            response.message = f"wind set: {wind_words(self.loop.wind())}"
         return response
 
     def _on_engine_failure(
@@ -362,12 +354,6 @@ class Simulator(Component):
     def stop(self) -> None:
         """End the flight; waiting callers get an error."""
         self.loop.stop()
-
-    def destroy_node(self) -> None:
-        """End the action of the standard services, which rclpy forgets, then the node."""
-        if self._standard_services is not None:
-            self._standard_services.destroy()
-        super().destroy_node()
 
     def finish(self) -> None:
         """End the publishing, then the log."""

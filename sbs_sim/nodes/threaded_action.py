@@ -12,7 +12,8 @@ from typing import Any
 
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
-from rclpy.node import Node
+
+from sbs_sim.nodes.component import Component
 
 RESULT_TIMEOUT = 60  # s that a result is kept for late requests; results are large
 
@@ -24,25 +25,23 @@ class ThreadedActionServer(ActionServer):
 
     Parameters
     ----------
-    node : Node
+    node : Component
+        Ends the action with itself, and waits for its threads.
     kind : type
         Of the action.
     name : str
     carry_out : callable
         Takes the goal's handle and returns the result.
-    threads : list of Thread
-        Where the threads are kept.
     succeeded : callable, optional
         Whether a goal with this result has succeeded; by default its field `success` says so.
     """
 
     def __init__(
         self,
-        node: Node,
+        node: Component,
         kind: Any,
         name: str,
         carry_out: Callable[[ServerGoalHandle], Any],
-        threads: list[threading.Thread],
         succeeded: Callable[[Any], bool] = lambda result: bool(result.success),
     ) -> None:
         super().__init__(
@@ -53,9 +52,10 @@ class ThreadedActionServer(ActionServer):
             cancel_callback=lambda _: CancelResponse.ACCEPT,
             result_timeout=RESULT_TIMEOUT,
         )
-        self._carry_out, self._threads, self._succeeded = carry_out, threads, succeeded
+        self._carry_out, self._threads, self._succeeded = carry_out, node.workers, succeeded
         self._results: queue.SimpleQueue[tuple[ServerGoalHandle, Any]] = queue.SimpleQueue()
         self._ready = node.create_guard_condition(self._hand_over)
+        node.actions.append(self)
 
     def notify_execute(self, goal_handle: ServerGoalHandle, execute_callback: Any) -> None:
         """Start a goal; called by rclpy where it would have its executor do the work."""

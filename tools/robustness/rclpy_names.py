@@ -15,11 +15,7 @@ OURS = Path(__file__).resolve().parents[2] / "sbs_sim" / "nodes"
 THEIRS = ("node.py", "action/server.py")
 BASES = frozenset(("Node", "BaseNode", "ActionServer"))
 # what we override on purpose, with a call of rclpy's own
-MEANT = {
-    "ThreadedActionServer": frozenset(("notify_execute",)),
-    "Analysis": frozenset(("destroy_node",)),
-    "Simulator": frozenset(("destroy_node",)),
-}
+MEANT = {"ThreadedActionServer": frozenset(("notify_execute",)), "Component": frozenset(("destroy_node",))}
 
 
 def names_of(found: ast.ClassDef) -> frozenset[str]:

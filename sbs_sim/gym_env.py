@@ -16,6 +16,7 @@ from __future__ import annotations  # `help` then shows types by their names
 
 import functools
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -30,12 +31,12 @@ from sbs_sim.analysis.linearize import linearize
 from sbs_sim.analysis.trim import trim
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.formation import Formation
-from sbs_sim.flight.mixer import Mixer
+from sbs_sim.flight.mixer import Mixers
 from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.model import state as S
-from sbs_sim.model.frames import quaternion_to_euler
+from sbs_sim.model.frames import euler_angles
 from sbs_sim.model.packing import lane_count
 from sbs_sim.pilot.hover_hold import AUTHORITY, HoverHold, HoverHoldDesign, HoverModel, design
 
@@ -50,9 +51,11 @@ OBSERVED = {  # name: largest magnitude; m, rad, m/s, rad/s, as the name says in
     **dict.fromkeys(("u", "v", "w"), 350.0),
     **dict.fromkeys(("p", "q", "r"), 100.0),
 }
+BOUNDS = np.array(list(OBSERVED.values()))
 ACTIONS = 4
 DEPARTURES = {"position": 1.0, "heading": math.radians(20.0), "velocity": 0.3, "rates": 0.1}  # at the start, uniform
-COSTS = {"position": 0.5, "heading": math.radians(10.0), "velocity": 1.0}  # that halve the reward [m, rad, m/s]
+# Departures that halve the reward: of position [m], heading [rad] and velocity [m/s].
+COSTS = np.array([0.5, 0.5, 0.5, math.radians(10.0), 1.0, 1.0, 1.0])
 MAX_DISTANCE = 5.0  # m from the origin
 MAX_TILT = math.radians(60.0)  # rad
 
@@ -67,15 +70,12 @@ def _aircraft(aircraft: str | Aircraft) -> Aircraft:
 
 
 class _Flight:
-    """One aircraft: what both environments have in common."""
+    """One aircraft in flight."""
 
     def __init__(self, aircraft: Aircraft) -> None:
         self.aircraft, self.hover = aircraft, _hover(aircraft)
         self.axes = aircraft.axis_controls
-        low, high = np.array(list(aircraft.control_ranges.values())).T
-        self._low, self._high = low, high
         self.simulation = Simulation(aircraft, trimmed_state(aircraft, self.hover), self.hover.swashplate, tick=PERIOD)
-        self.mixer = Mixer(aircraft)
 
     def restart(self, random: np.random.Generator) -> None:
         """Begin near the origin; the time of the simulation goes on, so that flights stay side by side."""
@@ -84,48 +84,66 @@ class _Flight:
         state[S.VELOCITY : S.RATES] += spread["velocity"]
         state[S.RATES : S.BODY_SIZE] += spread["rates"]
         self.simulation.reset(state, self.hover.swashplate)
-        self.mixer = Mixer(self.aircraft)
-        self.mixer.set_position(self.hover.swashplate)
-        self.mixer.set_target(self.hover.controls)
-        self.mixer.move(self.simulation.time)
 
-    def command(self, action: Any) -> None:
-        """Let an action act, shape (4,): departures of the controls over AUTHORITY."""
-        values = np.asarray(action, dtype=float)
-        if values.shape != (ACTIONS,) or not np.all(np.isfinite(values)):
+
+class _Flights:
+    """Flights at the same time: what both environments have in common."""
+
+    def __init__(self, aircraft: Aircraft, count: int) -> None:
+        self.each = [_Flight(aircraft) for _ in range(count)]
+        self.first = self.each[0]
+        self.ended = np.zeros(count, dtype=bool)
+        self._trimmed = np.array([0.0, self.first.hover.pitch, self.first.hover.roll])  # heading, pitch, roll
+        self._mixers = Mixers(aircraft, count)
+
+    def begin(self, random: Sequence[np.random.Generator]) -> None:
+        """Begin all flights at time 0."""
+        for flight in self.each:
+            flight.simulation.step = 0  # and with it the azimuths of the rotors
+        for i, own in enumerate(random):
+            self.restart(i, own)
+        self.ended[:] = False
+
+    def restart(self, i: int, random: np.random.Generator) -> None:
+        """Begin one flight near the origin, see `_Flight.restart`."""
+        self.each[i].restart(random)
+        self._mixers.set_position(i, self.first.hover.swashplate, self.first.simulation.time)
+
+    def command(self, actions: Any) -> Array:
+        """Swashplate angles [rad], shape (n, n_rows, 3), of actions, shape (n, 4): departures over AUTHORITY.
+
+        Those of flights that have ended do not act.
+        """
+        values, acting = np.asarray(actions, dtype=float), ~self.ended
+        if values.shape != (len(self.each), ACTIONS) or not np.all(np.isfinite(values[acting])):
             raise SimulationError(f"action = {checks.shown(values.tolist())}: allowed are {ACTIONS} finite numbers")
-        controls = self.hover.controls.copy()
-        controls[self.axes] += AUTHORITY * np.clip(values, -1.0, 1.0)
-        self.mixer.set_target(np.clip(controls, self._low, self._high))
-        self.simulation.set_swashplate(self.mixer.move(self.simulation.time))
+        departures = np.zeros((len(self.each), len(self.first.hover.controls)))
+        departures[:, self.first.axes] = AUTHORITY * np.where(acting[:, np.newaxis], np.clip(values, -1.0, 1.0), 0.0)
+        return self._mixers.move(self.first.hover.controls + departures, self.first.simulation.time)
 
-    def observation(self) -> NDArray[np.float32]:
-        """Observation, shape (12,)."""
-        body = self.simulation.state[: S.BODY_SIZE]
-        heading, pitch, roll = quaternion_to_euler(body[S.ATTITUDE : S.VELOCITY])
-        north, east, down = body[: S.ATTITUDE]
-        c, s = math.cos(heading), math.sin(heading)
-        values = [c * north + s * east, c * east - s * north, down]
-        values += [heading, pitch - self.hover.pitch, roll - self.hover.roll, *body[S.VELOCITY :]]
-        bounds = np.array(list(OBSERVED.values()))
-        return np.clip(values, -bounds, bounds).astype(np.float32)
+    def outcome(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_]]:
+        """Observations, shape (n, 12), rewards from 0 to 1, and which flights have departed too far for another step.
 
-    def reward(self) -> float:
-        """From 0 to 1: one over one more than the sum of the squares of the departures over COSTS."""
-        body = self.simulation.state[: S.BODY_SIZE]
-        heading = quaternion_to_euler(body[S.ATTITUDE : S.VELOCITY])[0]
-        parts = {"position": body[: S.ATTITUDE], "heading": np.array([heading]), "velocity": body[S.VELOCITY : S.RATES]}
-        return 1.0 / (1.0 + sum(float(np.sum(np.square(parts[name] / size))) for name, size in COSTS.items()))
-
-    def lost(self) -> bool:
-        """True where the flight has departed too far for another step."""
-        body = self.simulation.state[: S.BODY_SIZE]
-        _, pitch, roll = quaternion_to_euler(body[S.ATTITUDE : S.VELOCITY])
-        return bool(np.linalg.norm(body[: S.ATTITUDE]) > MAX_DISTANCE or max(abs(pitch), abs(roll)) > MAX_TILT)
+        A reward is one over one more than the sum of the squares of the departures over COSTS.
+        """
+        bodies = np.array([flight.simulation.state[: S.BODY_SIZE] for flight in self.each])
+        euler = euler_angles(bodies[:, S.ATTITUDE : S.VELOCITY])
+        north, east, down = bodies[:, : S.ATTITUDE].T
+        # not those of NumPy, whose bits may depend on the number of flights
+        c, s = (np.array([turn(angle) for angle in euler[:, 0].tolist()]) for turn in (math.cos, math.sin))
+        seen = np.empty((len(bodies), len(BOUNDS)))
+        seen[:, 0], seen[:, 1], seen[:, 2] = c * north + s * east, c * east - s * north, down
+        seen[:, 3:6], seen[:, 6:] = euler - self._trimmed, bodies[:, S.VELOCITY :]
+        departures = np.concatenate([bodies[:, : S.ATTITUDE], euler[:, :1], bodies[:, S.VELOCITY : S.RATES]], axis=1)
+        far = north * north + east * east + down * down > MAX_DISTANCE**2
+        far |= (np.abs(euler[:, 1:]) > MAX_TILT).any(axis=1)
+        costs = np.square(departures / COSTS)
+        rewards = 1.0 / (1.0 + (costs[:, :3].sum(axis=1) + costs[:, 3] + costs[:, 4:].sum(axis=1)))
+        return np.clip(seen, -BOUNDS, BOUNDS).astype(np.float32), rewards, far
 
 
 def _observation_space() -> spaces.Box:
-    high = np.array(list(OBSERVED.values()), dtype=np.float32)
+    high = BOUNDS.astype(np.float32)
     return spaces.Box(-high, high, dtype=np.float32)
 
 
@@ -156,7 +174,8 @@ class HoverEnv(gymnasium.Env):
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as the base class has it
 
     def __init__(self, aircraft: str | Aircraft = "sbs") -> None:
-        self.flight = _Flight(_aircraft(aircraft))
+        self._flights = _Flights(_aircraft(aircraft), 1)
+        self.flight = self._flights.first
         self.observation_space, self.action_space = _observation_space(), _action_space()
 
     def reset(
@@ -164,19 +183,20 @@ class HoverEnv(gymnasium.Env):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a flight; the same seed gives the same one."""
         super().reset(seed=seed)
-        self.flight.simulation.step = 0  # and with it the azimuths of the rotors
-        self.flight.restart(self.np_random)
-        return self.flight.observation(), {}
+        self._flights.begin([self.np_random])
+        return self._flights.outcome()[0][0], {}
 
     def step(self, action: Any) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Fly for 0.02 s."""
-        self.flight.command(action)
+        simulation, fault = self.flight.simulation, {}
+        simulation.swashplate = self._flights.command(np.asarray(action)[np.newaxis])[0]
         try:
-            self.flight.simulation.advance()
+            simulation.advance()
         except SimulationError as error:
-            return self.flight.observation(), 0.0, True, False, {"fault": str(error)}
-        lost = self.flight.lost()
-        return self.flight.observation(), 0.0 if lost else self.flight.reward(), lost, False, {}
+            fault = {"fault": str(error)}
+        observations, rewards, far = self._flights.outcome()
+        lost = bool(fault or far[0])
+        return observations[0], 0.0 if lost else float(rewards[0]), lost, False, fault
 
 
 class HoverVectorEnv(gymnasium.vector.VectorEnv):
@@ -194,22 +214,17 @@ class HoverVectorEnv(gymnasium.vector.VectorEnv):
     metadata: dict[str, Any] = {"autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP}  # noqa: RUF012 - as the base class has it
 
     def __init__(self, num_envs: int = 1, aircraft: str | Aircraft = "sbs", max_episode_steps: int = STEPS) -> None:
-        loaded = _aircraft(aircraft)
         self.num_envs = checks.integer("num_envs", num_envs, 1, 100_000, SimulationError)
-        self.flights = [_Flight(loaded) for _ in range(self.num_envs)]
-        self._limit = max_episode_steps
+        self._flights = _Flights(_aircraft(aircraft), self.num_envs)
+        self.flights, self._limit = self._flights.each, max_episode_steps
         self.single_observation_space, self.single_action_space = _observation_space(), _action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._random = [np.random.default_rng() for _ in self.flights]
-        self._steps, self._ended = np.zeros(num_envs, dtype=int), np.zeros(num_envs, dtype=bool)
-        self._together: list[tuple[list[int], Formation]] = []
-        self._arrange()
-
-    def _arrange(self) -> None:
-        lanes = lane_count()
-        groups = [list(range(begin, min(begin + lanes, self.num_envs))) for begin in range(0, self.num_envs, lanes)]
-        self._together = [(group, Formation([self.flights[i].simulation for i in group])) for group in groups]
+        self._steps = np.zeros(num_envs, dtype=int)
+        simulations, lanes = [flight.simulation for flight in self.flights], lane_count()
+        groups = [slice(i, i + lanes) for i in range(0, self.num_envs, lanes)]
+        self._together = [(group, Formation(simulations[group])) for group in groups]
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -221,48 +236,24 @@ class HoverVectorEnv(gymnasium.vector.VectorEnv):
         for i, own in enumerate(seeds):
             if own is not None:
                 self._random[i] = gymnasium.utils.seeding.np_random(own)[0]
-            self.flights[i].simulation.step = 0
-        for i in range(self.num_envs):
-            self.flights[i].restart(self._random[i])
-        self._steps[:], self._ended[:] = 0, False
-        return self._observations(), {}
+        self._flights.begin(self._random)
+        self._steps[:] = 0
+        return self._flights.outcome()[0], {}
 
     def step(
         self, actions: Any
     ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Fly for 0.02 s."""
-        begun, rewards, faults = self._ended.copy(), np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
-        for i, flight in enumerate(self.flights):
-            if not begun[i]:
-                flight.command(actions[i])
-        for group, formation in self._together:
-            swashplates = [self.flights[i].simulation.swashplate[np.newaxis] for i in group]
-            flown = formation.fly(swashplates, 1, 1, False)
-            faults[group] = [one.fault is not None for one in flown]
-        if faults.any():
-            self._mend(faults)
-        for i, flight in enumerate(self.flights):
-            if begun[i]:
-                flight.restart(self._random[i])
-        lost = np.array(
-            [not new and (bad or own.lost()) for new, bad, own in zip(begun, faults, self.flights, strict=True)]
-        )
-        for i in np.flatnonzero(~begun & ~lost).tolist():
-            rewards[i] = self.flights[i].reward()
+        begun, swashplates = self._flights.ended, self._flights.command(actions)
+        faults = np.concatenate([formation.advance(swashplates[group]) for group, formation in self._together])
+        for i in np.flatnonzero(begun).tolist():
+            self._flights.restart(i, self._random[i])
+        observations, rewards, far = self._flights.outcome()
+        lost = ~begun & (faults | far)
         self._steps = np.where(begun, 0, self._steps + 1)
         over = (self._steps >= self._limit) & ~lost
-        self._ended = lost | over
-        return self._observations(), rewards, lost, over, {}
-
-    def _mend(self, faults: NDArray[np.bool_]) -> None:
-        """Let flights that stopped short of a step go on beside the others."""
-        step = max(flight.simulation.step for flight in self.flights)
-        for i in np.flatnonzero(faults).tolist():
-            self.flights[i].simulation.step = step
-        self._arrange()
-
-    def _observations(self) -> NDArray[np.float32]:
-        return np.stack([flight.observation() for flight in self.flights])
+        self._flights.ended = lost | over
+        return observations, np.where(begun | lost, 0.0, rewards), lost, over, {}
 
 
 class HoverBaseline:

@@ -19,7 +19,7 @@ from sbs_sim.model import state as S
 from sbs_sim.model.air_rows import CG_ROWS
 from sbs_sim.model.fly import fly
 from sbs_sim.model.frames import down_of
-from sbs_sim.model.integrate import FLYING
+from sbs_sim.model.integrate import FLYING, advance
 from sbs_sim.model.packing import lane_count, side_by_side
 from sbs_sim.model.records import LOAD_SIZE
 from sbs_sim.model.wind_columns import WIND_SIZE
@@ -189,6 +189,32 @@ class Formation:
                 )
             )
         return found
+
+    def advance(self, swashplates: Array) -> NDArray[np.bool_]:
+        """Fly one tick without records; the states are those that `fly` gives.
+
+        Parameters
+        ----------
+        swashplates : ndarray, shape (n_flights, n_rows, 3)
+            Angles of each flight [rad].
+
+        Returns
+        -------
+        ndarray of bool, shape (n_flights,)
+            True for flights that could not go on: they have their last good state, and the time of the others.
+        """
+        engine, first, count = self._engine, self.simulations[0], len(self.simulations)
+        x, failed = engine.lanes([one.state for one in self.simulations]), np.full(engine.n, FLYING)
+        angles = engine.lanes(list(swashplates.reshape(count, -1)))
+        end = first.step + first.steps_per_tick
+        advance(
+            *(engine.code.derivative, engine.model, x, angles, self._start, first.step, first.steps_per_tick),
+            *(first.step_size, engine.lanes([one.air for one in self.simulations]), first.method, self._bounds),
+            *(engine.work, engine.tick, engine.tick.done, failed),
+        )
+        for one, state, own in zip(self.simulations, x.T[:count].copy(), swashplates, strict=True):
+            one.take_over(end, state, one.next_air(end), own)
+        return failed[:count] != FLYING
 
     def _air(self, winds: Sequence[Array]) -> Array:
         """Velocity of the air at the c.g., (k, 3) of each flight, with the rows that depend on its place behind it."""

@@ -107,9 +107,7 @@ class Mixer:
         else:
             elapsed = max(0.0, time - self._time)
             reach = self._rates * (min(elapsed, REST_CREDIT) if self._rests else elapsed)
-            gap = self._target - self._angles
-            # where the target is in reach it is taken itself: a sum would miss it by rounding
-            self._angles = np.where(np.abs(gap) <= reach, self._target, self._angles + np.sign(gap) * reach)
+            self._angles = _moved(self._angles, self._target, reach)
         self._rests = self.arrived
         self._time = time
         return self._angles.copy()
@@ -125,6 +123,49 @@ class Mixer:
         if self._target is None:
             return True
         return self._angles is not None and np.array_equal(self._angles, self._target)
+
+
+class Mixers:
+    """Mixers of flights side by side, each of which moves as `Mixer` does, bit for bit.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    count : int
+        Of flights, whose swashplates rest at zero at time 0, or where and when `set_position` says.
+    """
+
+    def __init__(self, aircraft: Aircraft, count: int) -> None:
+        self._mix = aircraft.mix
+        self._low, self._high = np.array([control.range for control in aircraft.controls]).T
+        self._swash_low, self._swash_high = np.moveaxis(np.array([row.ranges for row in aircraft.rows]), -1, 0)
+        self._rates = np.array([[row.rate] for row in aircraft.rows])
+        self._angles = np.zeros((count, *self._swash_low.shape))
+        self._rest, self._time = np.ones((count, 1, 1), dtype=bool), np.zeros((count, 1, 1))
+
+    def set_position(self, i: int, angles: ArrayLike, time: float) -> None:
+        """Set the angles at which the swashplates of a flight rest [rad], shape (n_rows, 3), at a time [s]."""
+        self._angles[i], self._rest[i], self._time[i] = angles, True, time
+
+    def move(self, controls: Array, time: float) -> Array:
+        """Swashplate angles [rad], shape (count, n_rows, 3), at a time [s], on the way to what finite controls want.
+
+        The controls have the shape (count, n_controls).
+        """
+        elapsed = np.maximum(0.0, time - self._time)
+        wanted = np.array([self._mix(own) for own in np.clip(controls, self._low, self._high)])
+        target = np.clip(wanted, self._swash_low, self._swash_high)
+        reach = self._rates * np.where(self._rest, np.minimum(elapsed, REST_CREDIT), elapsed)
+        self._angles = _moved(self._angles, target, reach)
+        self._rest, self._time[:] = (self._angles == target).all(axis=(1, 2), keepdims=True), time
+        return self._angles.copy()
+
+
+def _moved(angles: Array, target: Array, reach: Array) -> Array:
+    """Angles that have gone towards a target as far as they reach."""
+    gap = target - angles
+    # where the target is in reach it is taken itself: a sum would miss it by rounding
+    return np.where(np.abs(gap) <= reach, target, angles + np.sign(gap) * reach)
 
 
 def limit_texts(aircraft: Aircraft, reached: NDArray[np.int64]) -> list[str]:

@@ -303,7 +303,7 @@ class Simulation:
         checks.instance("wind", wind, Wind, SimulationError)
         self._wind_step = self.step
         self._set_field(WindField(wind, self.time, self.tick, self._level))
-        self._air = self._with_rings(self._field.next_tick()[np.newaxis], self.step)[0]
+        self._air = self.next_air(self.step)
 
     def _set_field(self, field: WindField) -> None:
         """Fly through the air of a wind from now on, with the noise of its seed."""
@@ -375,7 +375,7 @@ class Simulation:
         self.step += int(engine.tick.done[0])
         if failed[0] != FLYING:
             raise self.failure(int(failed[0]), float(engine.tick.last[min(failed[0], engine.size - 1), 0]))
-        self._air = self._with_rings(self._field.next_tick()[np.newaxis], self.step)[0]
+        self._air = self.next_air(self.step)
 
     def failure(self, failed: int, value: float) -> SimulationError:
         """Why the flight cannot go on: a state that the next step would take to a value beyond the plausible."""
@@ -401,6 +401,15 @@ class Simulation:
     def take_over(self, step: int, state: Array, air: Array, swashplate: Array) -> None:
         """Take over what a flight in a formation has come to, with the air of its next tick."""
         self.step, self.state, self._air, self.swashplate = step, state, air, swashplate
+
+    @property
+    def air(self) -> Array:
+        """Air of the next tick, a row of `air_ahead`."""
+        return self._air
+
+    def next_air(self, step: int) -> Array:
+        """Air of the tick after those that were asked for, which begins at a step; the next call may overwrite it."""
+        return self._with_rings(self._field.next_tick()[np.newaxis], step)[0]
 
     def air_ahead(self, ticks: int) -> Array:
         """Air of this tick and of so many that follow, shape (ticks + 1, WIND_SIZE).

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from sbs_sim import Aircraft
 from sbs_sim.errors import SimulationError
-from sbs_sim.flight.mixer import Mixer
+from sbs_sim.flight.mixer import Mixer, Mixers
 from sbs_sim.model.state import CONTROL_NAMES
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -228,3 +228,24 @@ def test_output_is_within_the_ranges_and_no_faster_than_the_rates(name, first, m
     goal = np.clip(aircraft.mix(np.clip(controls, *ranges.T)), low, high)
     np.testing.assert_array_equal(mixer.move(time + 60.0), goal)
     assert mixer.arrived
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    st.sampled_from(sorted(AIRCRAFT)),
+    st.tuples(CONTROLS, CONTROLS),
+    st.lists(st.tuples(CONTROLS, CONTROLS, st.booleans(), st.floats(0.0, 0.2)), max_size=12),
+)
+def test_mixers_side_by_side_move_as_mixers_do(name, first, moves):
+    aircraft, time = AIRCRAFT[name], 0.0
+    alone, together = [started(aircraft, np.array(controls) / DEG) for controls in first], Mixers(aircraft, 2)
+    for i, mixer in enumerate(alone):
+        together.set_position(i, mixer.position, time)
+    for *controls, restarts, pause in moves:
+        if restarts:
+            alone[1] = started(aircraft, np.zeros(4), time)
+            together.set_position(1, alone[1].position, time)
+        time += pause
+        for mixer, own in zip(alone, controls, strict=True):
+            mixer.set_target(own)
+        np.testing.assert_array_equal(together.move(np.array(controls), time), [mixer.move(time) for mixer in alone])

@@ -99,7 +99,8 @@ class _Flights:
     def begin(self, random: Sequence[np.random.Generator]) -> None:
         """Begin all flights at time 0."""
         for flight in self.each:
-            flight.simulation.step = 0  # and with it the azimuths of the rotors
+            flight.simulation.step = 0  # and with it the azimuths of the rotors, and the noise of vortex rings
+            flight.simulation.set_wind(flight.simulation.wind)
         for i, own in enumerate(random):
             self.restart(i, own)
         self.ended[:] = False

@@ -1,10 +1,13 @@
 """The environment of Gymnasium: by its own checks, beside flights of its own, and against doing nothing."""
 
+import dataclasses
+
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from sbs_sim import Aircraft
 from sbs_sim.errors import SimulationError
 from sbs_sim.gym_env import ACTIONS, NAME, STEPS, HoverBaseline
 from sbs_sim.model import state as S
@@ -78,6 +81,18 @@ def test_a_fault_of_a_flight_is_its_own(env):
     env.reset(seed=9)
     np.testing.assert_array_equal(seen[2], [env.unwrapped.step(NOTHING)[0] for _ in range(3)][-1])
     assert len({flight.simulation.time for flight in flights.flights}) == 1
+
+
+def test_a_seed_gives_the_same_flight_again_where_thrust_fluctuates():
+    sbs = Aircraft.load("sbs")
+    rotors = tuple(dataclasses.replace(rotor, descent="measured", ring_unsteadiness=0.2) for rotor in sbs.rotors)
+    own = gymnasium.make(NAME, aircraft=dataclasses.replace(sbs, rotors=rotors)).unwrapped
+    seen = []
+    for _ in range(2):
+        own.reset(seed=0)
+        own.flight.simulation.state[S.VELOCITY + 2] += 4.0
+        seen.append([own.step(NOTHING)[0] for _ in range(3)])
+    np.testing.assert_array_equal(seen[0], seen[1])
 
 
 def test_actions_that_are_none_are_refused(env):

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from sbs_sim import checks
 from sbs_sim.errors import SimulationError
-from sbs_sim.model.gust_table import DISTANCE, TIME, GustTable
+from sbs_sim.model.gust_table import DISTANCE, MAX_GUST, TIME, GustTable
 
 VELOCITIES = ["north [m/s]", "east [m/s]", "down [m/s]"]
 HEADS = {"time [s]": TIME, "distance [m]": DISTANCE}
 MAX_SIZE = 2_000_000  # bytes of a file
+MAX_POSITION = 1e6  # s or m, as in `GustTable`
 
 
 def read_gust(path: str | Path) -> GustTable:
@@ -48,7 +50,12 @@ def gust_table(text: str, name: str = "gust") -> GustTable:
     if len(head) != 4 or head[0] not in HEADS or head[1:] != VELOCITIES:
         allowed = " or ".join(f"'{first},{','.join(VELOCITIES)}'" for first in HEADS)
         raise SimulationError(f"{name}: the first line is {','.join(head)[:60]!r}: allowed is {allowed}")
-    rows = [_numbers(row, number, name) for number, row in lines[1:]]
+    rows: list[list[float]] = []
+    for number, row in lines[1:]:
+        rows.append(_numbers(row, head, f"{name}, line {number}"))
+        if len(rows) > 1 and not rows[-1][0] > rows[-2][0]:
+            allowed = f"more than {rows[-2][0]:g}, the one before"
+            raise SimulationError(f"{name}, line {number}: {head[0]} = {rows[-1][0]:g}: allowed is {allowed}")
     try:
         table = np.array(rows).reshape(-1, 4)
         return GustTable(HEADS[head[0]], table[:, 0], table[:, 1:])
@@ -56,11 +63,13 @@ def gust_table(text: str, name: str = "gust") -> GustTable:
         raise SimulationError(f"{name}: {error}") from None
 
 
-def _numbers(row: list[str], number: int, name: str) -> list[float]:
+def _numbers(row: list[str], head: list[str], place: str) -> list[float]:
     try:
         values = [float(cell) for cell in row]
     except ValueError:
         values = []
     if len(values) != 4 or not all(map(math.isfinite, values)):
-        raise SimulationError(f"{name}, line {number}: {','.join(row)[:60]!r}: allowed are 4 numbers")
+        raise SimulationError(f"{place}: {','.join(row)[:60]!r}: allowed are 4 numbers")
+    for column, value, most in zip(head, values, (MAX_POSITION, *[MAX_GUST] * 3), strict=True):
+        checks.number(f"{place}: {column}", value, -most, most, "", SimulationError)
     return values

@@ -20,12 +20,13 @@ Kind = type[SbsError]
 MAX_SHOWN = 60  # characters of a value in a message
 
 
-def number(name: str, value: Any, minimum: float, maximum: float, unit: str, error: Kind) -> float:
-    """A number from `minimum` to `maximum`, ends included; strings and booleans are refused."""
+def number(name: str, value: Any, minimum: float, maximum: float, unit: str, error: Kind, zero: str = "") -> float:
+    """A number from `minimum` to `maximum`, ends included, or a 0 that means `zero`; no strings and no booleans."""
     plain = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
     is_number = isinstance(plain, numbers.Real) and not isinstance(plain, bool)
-    if not (is_number and minimum <= plain <= maximum):  # false for a NaN as well
-        raise error(f"{name} = {shown(value)}: allowed are {minimum:g} to {maximum:g}{f' {unit}' if unit else ''}")
+    if not (is_number and (minimum <= plain <= maximum or (zero and plain == 0))):  # false for a NaN as well
+        allowed = f"{minimum:g} to {maximum:g}{f' {unit}' if unit else ''}"
+        raise error(f"{name} = {shown(value)}: allowed are {f'0, which is {zero}, and ' if zero else ''}{allowed}")
     return float(plain)
 
 

@@ -40,21 +40,29 @@ Array = NDArray[np.float64]
 BLOCK = 10_000  # ticks by which turbulence is advanced at once
 MIN_TURBULENCE_AIRSPEED = 1.0  # m/s, at which a frozen field passes where there is neither wind nor flight
 MAX_WIND = 100.0  # m/s; the strongest wind measured at the ground is 113 m/s
+# m, passed in a millisecond at the highest speed: what is shorter falls between steps of integration
+LEAST_LENGTH = 0.1
 RANGES = {
     "gust_delay": (0.0, 1e6, "s"),
     "gust_duration": (0.0, 1e6, "s"),
-    "turbulence_length": (0.1, 1e4, "m"),
+    "turbulence_length": (LEAST_LENGTH, 1e4, "m"),
     "turbulence_airspeed": (0.1, MAX_WIND, "m/s"),
     "turbulence_direction": (-10.0, 10.0, "rad"),
-    "turbulence_lateral_length": (0.0, 1e4, "m"),
-    "turbulence_vertical_length": (0.0, 1e4, "m"),
-    "turbulence_span": (0.0, 1e3, "m"),
-    "gust_length": (0.0, 1e6, "m"),
+    "turbulence_lateral_length": (LEAST_LENGTH, 1e4, "m"),
+    "turbulence_vertical_length": (LEAST_LENGTH, 1e4, "m"),
+    "turbulence_span": (0.01, 1e3, "m"),  # the least radius of a rotor
+    "gust_length": (LEAST_LENGTH, 1e6, "m"),
     "gust_distance": (-1e6, 1e6, "m"),
     "gust_direction": (-10.0, 10.0, "rad"),
     "reference_height": (0.1, 1e4, "m"),
     "roughness_length": (1e-6, 10.0, "m"),
     "profile_exponent": (0.0, 1.0, ""),
+}
+ZEROS = {  # what 0 means, where it is below the range
+    "turbulence_lateral_length": "turbulence_length",
+    "turbulence_vertical_length": "turbulence_length",
+    "turbulence_span": "none",
+    "gust_length": "a gust over time",
 }
 POINT, RATES, FIELD, ELEMENTS = "point", "rates", "field", "elements"
 FIELDS = (FIELD, ELEMENTS)
@@ -65,7 +73,6 @@ CHOICES = {
     "wind_profile": ("uniform", "logarithmic", "power"),
 }
 VECTOR_RANGES = {"turbulence_intensity": (0.0, MAX_WIND, "m/s"), "gust_origin": (-1e8, 1e8, "m")}
-LEAST_LENGTH = 0.1  # m, of turbulence
 
 
 @kernel
@@ -207,10 +214,9 @@ class Wind:
                 for axis, value in zip("xyz", values, strict=True)
             ]
             object.__setattr__(self, name, tuple(numbers))
-        for name, (minimum, maximum, unit) in RANGES.items():
-            object.__setattr__(
-                self, name, checks.number(name, getattr(self, name), minimum, maximum, unit, SimulationError)
-            )
+        for name, bounds in RANGES.items():
+            value = checks.number(name, getattr(self, name), *bounds, SimulationError, ZEROS.get(name, ""))
+            object.__setattr__(self, name, value)
         for name, allowed_words in CHOICES.items():
             checks.choice(name, getattr(self, name), allowed_words, SimulationError)
         if self.own_gust is not None:
@@ -226,7 +232,7 @@ class Wind:
     def _check_gust(self) -> None:
         """Raise SimulationError for a gust that is neither over time nor over distance, or both."""
         if any(self.gust) and not (self.gust_duration > 0.0 or self.gust_length > 0.0):
-            raise SimulationError("gust_duration = 0: allowed is a length above 0 for a gust")
+            raise SimulationError("gust_duration = 0, gust_length = 0: allowed is one of them above 0 for a gust")
         if self.gust_duration > 0.0 and self.gust_length > 0.0:
             raise SimulationError(
                 f"gust_length = {self.gust_length:g}: allowed is 0 with gust_duration = {self.gust_duration:g} s"
@@ -235,12 +241,7 @@ class Wind:
             raise SimulationError("gust_shape = 'ramp': allowed is one_minus_cosine with a gust_duration, over time")
 
     def _check_turbulence(self) -> None:
-        """Raise SimulationError for scale lengths too small, and for what an extent of turbulence does not go with."""
-        for name in ("turbulence_lateral_length", "turbulence_vertical_length"):
-            value = getattr(self, name)
-            if 0.0 < value < LEAST_LENGTH:
-                allowed = f"0, which is turbulence_length, and {LEAST_LENGTH:g} to 10000 m"
-                raise SimulationError(f"{name} = {value:g}: allowed are {allowed}")
+        """Raise SimulationError for what an extent of turbulence does not go with."""
         if self.turbulence_extent == RATES and not self.turbulence_span > 0.0:
             raise SimulationError("turbulence_span = 0: allowed is a span above 0 with turbulence_extent = 'rates'")
         if self.turbulence_extent in FIELDS:

@@ -39,6 +39,7 @@ from sbs_msgs.msg import (
 )
 from sbs_msgs.msg import Wind as WindMessage
 from sbs_msgs.srv import SetWind
+from sbs_sim import checks
 from sbs_sim.aircraft import Aircraft
 from sbs_sim.aircraft.description import Rotor
 from sbs_sim.errors import SimulationError
@@ -52,7 +53,7 @@ from sbs_sim.model.frames import quaternion_to_euler, rotation_matrix
 from sbs_sim.model.gust_table import GustTable
 from sbs_sim.model.multiblade import blade_matrix
 from sbs_sim.model.state import harmonic_count
-from sbs_sim.model.wind import FIELDS, MAX_WIND, MIN_TURBULENCE_AIRSPEED, RATES, Wind, field_of
+from sbs_sim.model.wind import FIELDS, MAX_WIND, MIN_TURBULENCE_AIRSPEED, RANGES, RATES, Wind, field_of
 from sbs_sim.recording.recorded_flight import DRIVE_FIELDS
 
 Array = NDArray[np.float64]
@@ -64,7 +65,6 @@ FRAME_BASE = "base_link"
 BLADE_FIELDS = ("flap", "flap_rate", "lag", "lag_rate", "blade_flap", "blade_lag")
 HALF = math.sqrt(0.5)
 MAX_VALUE = 1e9  # of any number of a flight that can be shown
-DEFAULT_TURBULENCE_LENGTH = 50.0  # m
 
 
 def to_time(seconds: float) -> Time:
@@ -124,12 +124,19 @@ def command_fields(aircraft: Aircraft, rows: Array) -> dict[str, Any]:
     }
 
 
-# fields of a request that are those of a wind, and such whose 0 is its default
+# fields of a request that are those of a wind, and such whose 0 is a default, with what that is
 GIVEN = (
     *("turbulence_model", "turbulence_lateral_length", "turbulence_vertical_length", "turbulence_extent"),
     *("gust_shape", "gust_length", "gust_distance", "wind_profile"),
 )
-DEFAULTED = ("reference_height", "roughness_length", "profile_exponent")
+DEFAULTED = {
+    "turbulence_length": "50 m",
+    "turbulence_airspeed": "that of the flow",
+    "turbulence_span": "that of the rotors",
+    "reference_height": "20 ft",
+    "roughness_length": "0.15 ft",
+    "profile_exponent": "1/7",
+}
 
 
 def wind_of(request: SetWind.Request, snapshot: Snapshot, aircraft: Aircraft) -> Wind:
@@ -148,23 +155,33 @@ def wind_of(request: SetWind.Request, snapshot: Snapshot, aircraft: Aircraft) ->
     direction = math.atan2(relative[1], relative[0]) if moving else heading
     north, east, down = snapshot.state[: S.ATTITUDE].tolist()
     span = aircraft.rotor_span if request.turbulence_extent == RATES else 0.0
+    defaults: dict[str, Any] = {
+        "turbulence_airspeed": min(max(speed, MIN_TURBULENCE_AIRSPEED), MAX_WIND),
+        "turbulence_span": span,
+    }
     return Wind(
         velocity=velocity,
         gust=_triple(request.gust),
         gust_delay=request.gust_delay,
         gust_duration=request.gust_duration,
         turbulence_intensity=_triple(request.turbulence_intensity),
-        turbulence_length=request.turbulence_length or DEFAULT_TURBULENCE_LENGTH,
-        turbulence_airspeed=request.turbulence_airspeed or min(max(speed, MIN_TURBULENCE_AIRSPEED), MAX_WIND),
         turbulence_direction=direction,
         turbulence_seed=request.turbulence_seed,
-        turbulence_span=request.turbulence_span or span,
         gust_direction=direction,
         gust_origin=(north, east, down),
         own_gust=gust_table(request.own_gust_csv, "own_gust_csv") if request.own_gust_csv else None,
         **{name: getattr(request, name) for name in GIVEN},
-        **{name: value for name in DEFAULTED if (value := getattr(request, name)) != 0.0},
+        **defaults | _not_zero(request),
     )
+
+
+def _not_zero(request: SetWind.Request) -> dict[str, float]:
+    """What a request has in place of defaults."""
+    values = {
+        name: checks.number(name, getattr(request, name), *RANGES[name], SimulationError, default)
+        for name, default in DEFAULTED.items()
+    }
+    return {name: value for name, value in values.items() if value != 0.0}
 
 
 def wind_words(wind: Wind) -> str:
@@ -192,13 +209,12 @@ def prepare_field(request: SetWind.Request) -> None:
         See `Wind`.
     """
     if request.turbulence_extent in FIELDS:
-        turbulence = {name: getattr(request, name) for name in GIVEN if name.startswith("turbulence")}
+        turbulence: dict[str, Any] = {name: getattr(request, name) for name in GIVEN} | _not_zero(request)
         field_of(
             Wind(
                 turbulence_intensity=_triple(request.turbulence_intensity),
-                turbulence_length=request.turbulence_length or DEFAULT_TURBULENCE_LENGTH,
                 turbulence_seed=request.turbulence_seed,
-                **turbulence,
+                **{name: value for name, value in turbulence.items() if name.startswith("turbulence")},
             )
         )
 

@@ -277,7 +277,7 @@ def test_wind_moves_the_aircraft_and_a_gust_passes(client):
             {"from_state": True, "position": Point(z=-5.0)},
             "position.z = -5: not allowed with from_state",
         ),
-        ("set_wind", SetWind, {"gust": Vector3(z=-4.0)}, "gust_duration = 0: allowed is a length above 0 for a gust"),
+        ("set_wind", SetWind, {"gust": Vector3(z=-4.0)}, "gust_duration = 0, gust_length = 0: allowed is one of them"),
         ("reset", Reset, {"from_state": True, "state": [0.0] * 43}, "attitude has a norm of 0"),
         (
             "reset",
@@ -293,6 +293,18 @@ def test_wind_moves_the_aircraft_and_a_gust_passes(client):
             "velocity.y = 500.0: allowed are -100 to 100 m/s",
         ),
         ("set_wind", SetWind, {"gust_duration": -1.0}, "gust_duration = -1.0"),
+        (
+            "set_wind",
+            SetWind,
+            {"turbulence_extent": "field", "turbulence_length": 0.01},
+            "turbulence_length = 0.01: allowed are 0, which is 50 m, and 0.1 to 10000 m",
+        ),
+        (
+            "set_wind",
+            SetWind,
+            {"own_gust_csv": "time [s],north [m/s],east [m/s],down [m/s]\n0,0,0,0\n\n1,0,200,0"},
+            "own_gust_csv, line 4: east [m/s] = 200.0: allowed are -100 to 100",
+        ),
         ("set_wind", SetWind, {"turbulence_intensity": Vector3(z=-1.0)}, "turbulence_intensity.z = -1.0"),
         ("step", Step, {"ticks": 1001}, "ticks = 1001: allowed are integers from 1 to 1000"),
         ("step", Step, {"ticks": 4294967295}, "ticks = 4294967295: allowed are integers from 1 to"),

@@ -61,8 +61,10 @@ def test_a_gust_without_a_delay_begins_at_once():
 
 def test_a_gust_that_takes_no_time_is_refused():
     """It would not be felt."""
-    with pytest.raises(SimulationError, match=r"^gust_duration = 0: allowed is a length above 0 for a gust$"):
-        Wind(gust=(8.0, 0.0, 0.0))
+    line = "gust_duration = 0, gust_length = 0: allowed is one of them above 0 for a gust"
+    for over_distance in ({}, {"gust_shape": "ramp"}, {"gust_distance": 5.0}):
+        with pytest.raises(SimulationError, match=f"^{line}$"):
+            Wind(gust=(8.0, 0.0, 0.0), **over_distance)
     assert Wind(gust_duration=0.0).gust == (0.0, 0.0, 0.0)
 
 

@@ -29,8 +29,8 @@ REFUSED = {
         "own_gust_csv: the first line is 'time,north': allowed is 'time [s],north [m/s],east [m/s],down [m/s]' or",
     ),
     "turbulence_extent": ("planes", "turbulence_extent = 'planes': allowed are point, rates, field, elements"),
-    "roughness_length": (-1.0, "roughness_length = -1.0: allowed are 1e-06 to 10 m"),
-    "gust_length": (float("nan"), "gust_length = nan: allowed are 0 to 1e+06 m"),
+    "roughness_length": (-1.0, "roughness_length = -1.0: allowed are 0, which is 0.15 ft, and 1e-06 to 10 m"),
+    "gust_length": (float("nan"), "gust_length = nan: allowed are 0, which is a gust over time, and 0.1 to 1e+06 m"),
 }
 
 

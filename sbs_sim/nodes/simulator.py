@@ -21,7 +21,7 @@ from sbs_sim.analysis.trim import TWO_BLADES, trim
 from sbs_sim.errors import SbsError, SimulationError, TrimError
 from sbs_sim.flight.contact import state_on_ground
 from sbs_sim.flight.gust_file import read_gust
-from sbs_sim.flight.gust_standards import specified_turbulence
+from sbs_sim.flight.gust_standards import WIND_AT_20_FT, specified_turbulence
 from sbs_sim.flight.simulation import AUTO, AZIMUTH_STEP_DEG, FREE_METHOD, METHOD, METHODS, Simulation
 from sbs_sim.flight.stitched import StitchedModel
 from sbs_sim.flight.stitched_file import load
@@ -30,7 +30,7 @@ from sbs_sim.flight.trim_point import TrimPoint
 from sbs_sim.flight.trimmed_state import MAX_SPEED, standing_state, trimmed_state
 from sbs_sim.flight.validity import slow_rotors
 from sbs_sim.flight_loop import FlightLoop
-from sbs_sim.model.wind import MAX_WIND, MIN_TURBULENCE_AIRSPEED, RATES, Wind
+from sbs_sim.model.wind import CHOICES, MAX_WIND, MIN_TURBULENCE_AIRSPEED, RATES, Wind
 from sbs_sim.nodes.command_monitor import CommandMonitor
 from sbs_sim.nodes.component import Component
 from sbs_sim.nodes.control_mixer import ControlMixer
@@ -213,8 +213,6 @@ class Simulator(Component):
 
     def _start(self, values: dict[str, Any]) -> Simulation:
         """Simulation in trimmed flight at the condition that the parameters name, or of rotors on a stand."""
-        if len(values["wind"]) != 3:
-            raise SbsError(f"parameter wind = {list(values['wind'])}: allowed are 3 numbers, north, east, down [m/s]")
         self._ground = ground_altitude(self.aircraft, values["ground_altitude"])
         height = values["altitude"] - self._ground
         wind = initial_wind(values, height, self.aircraft)
@@ -450,20 +448,31 @@ def initial_wind(values: dict[str, Any], height: float, aircraft: Aircraft) -> W
     SbsError
         A value is out of range, or the file of a gust cannot be read.
     """
-    extent, airspeed = values["turbulence_extent"], abs(values["airspeed"])
+    velocity, extent, airspeed = tuple(values["wind"]), values["turbulence_extent"], abs(values["airspeed"])
+    if len(velocity) != 3 or not all(abs(part) <= MAX_WIND for part in velocity):  # false for a NaN as well
+        allowed = f"3 numbers, north, east, down, {-MAX_WIND:g} to {MAX_WIND:g} m/s"
+        raise SimulationError(f"parameter wind = {list(velocity)}: allowed are {allowed}")
+    checks.choice("parameter turbulence", values["turbulence"], (OFF, *WIND_AT_20_FT), SimulationError)
+    model = checks.choice(
+        "parameter turbulence_model", values["turbulence_model"], CHOICES["turbulence_model"], SimulationError
+    )
     fields = {name: values[name] for name in WIND_PARAMETERS}
     if values["turbulence"] != OFF:
-        fields |= specified_turbulence(height, values["turbulence"], model=values["turbulence_model"])
-        passing = airspeed or math.hypot(*values["wind"][:2])
+        fields |= specified_turbulence(height, values["turbulence"], model=model)
+        passing = airspeed or math.hypot(*velocity[:2])
         fields["turbulence_airspeed"] = min(max(passing, MIN_TURBULENCE_AIRSPEED), MAX_WIND)
         fields["turbulence_direction"] = values["heading"]
-    return Wind(
-        velocity=tuple(values["wind"]),
-        turbulence_span=aircraft.rotor_span if extent == RATES else 0.0,
-        gust_direction=values["heading"],
-        own_gust=read_gust(values["gust_file"]) if values["gust_file"] else None,
-        **fields,
-    )
+    own_gust = read_gust(values["gust_file"]) if values["gust_file"] else None
+    try:
+        return Wind(
+            velocity=velocity,
+            turbulence_span=aircraft.rotor_span if extent == RATES else 0.0,
+            gust_direction=values["heading"],
+            own_gust=own_gust,
+            **fields,
+        )
+    except SimulationError as error:  # all that is left names fields that are parameters, too
+        raise SimulationError(f"parameter {error}") from None
 
 
 def checked_components(names: list[str]) -> tuple[str, ...]:

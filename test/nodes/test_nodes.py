@@ -660,7 +660,12 @@ def test_starts_in_trimmed_forward_flight_with_wind(own_world):
         ({"airsped": 3.0}, "parameter airsped: unknown"),
         ({"publish_rate": 1.0, "azimuth_step_deg": 0.01}, "1440000 steps in a tick"),
         ({"wind": "[1.0, 2.0]"}, "parameter wind"),
-        ({"wind": "[1.0, 2.0, .nan]"}, "velocity.z = nan"),
+        ({"wind": "[1, 2, 300]"}, "wind = [1.0, 2.0, 300.0]: allowed are 3 numbers, north, east, down, -100 to 100 "),
+        ({"wind": "[1.0, 2.0, .nan]"}, "parameter wind = [1.0, 2.0, nan]"),
+        ({"turbulence": "heavy"}, "parameter turbulence = 'heavy': allowed are off, light, moderate, severe"),
+        ({"turbulence": "light", "turbulence_model": "gauss"}, "parameter turbulence_model = 'gauss': allowed are"),
+        ({"turbulence_extent": "planes"}, "parameter turbulence_extent = 'planes': allowed are point, rates"),
+        ({"turbulence_seed": -1}, "parameter turbulence_seed = -1"),
         ({"airspeed": 95.0}, "no trim"),
     ],
 )

@@ -20,6 +20,7 @@ from sbs_sim.terminal.command_line import Parser
 if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
     from sbs_sim.analysis.linear_model import LinearModel
+    from sbs_sim.model.gust_table import GustTable
     from sbs_sim.model.wind import Wind
     from sbs_sim.pilot.hover_hold import HoverHoldDesign
 
@@ -132,7 +133,11 @@ def _airs(arguments: argparse.Namespace, craft: "Aircraft") -> dict[str, tuple["
     name = (
         f"turbulence {arguments.turbulence:g} m/s" if arguments.severity is None else f"{arguments.severity} turbulence"
     )
-    airs = {name: (Wind(**fields | air_fields(arguments, craft)), SETTLING, arguments.duration)}
+    fields |= air_fields(arguments, craft)
+    own_gust = fields.pop("own_gust", None)
+    airs = {name: (Wind(**fields), SETTLING, arguments.duration)}
+    if own_gust is not None:
+        airs["own gust"] = _own_gust(arguments, own_gust)
     if (arguments.rule is None) != (arguments.gradient is None):
         raise UsageError("--rule, --gradient: allowed are both or neither")
     if arguments.rule is not None:
@@ -144,14 +149,34 @@ def _airs(arguments: argparse.Namespace, craft: "Aircraft") -> dict[str, tuple["
     return airs
 
 
+def _own_gust(arguments: argparse.Namespace, table: "GustTable") -> tuple["Wind", float, float]:
+    """A gust of --gust-file in the steady wind, after the integrals have settled."""
+    from sbs_sim.model.gust_table import DISTANCE
+    from sbs_sim.model.wind import Wind
+
+    begin, wind, passing = SETTLING + GUST_DELAY, arguments.wind, max(float(table.positions[-1]), 0.0)
+    if table.over == DISTANCE:
+        _check_passing(arguments, "the gust of --gust-file")
+        passing /= wind
+    air = Wind(velocity=(-wind, 0.0, 0.0), own_gust=table, gust_delay=begin, gust_distance=wind * begin)
+    return air, SETTLING, GUST_DELAY + passing + AFTER_GUST
+
+
+def _check_passing(arguments: argparse.Namespace, what: str) -> None:
+    """Raise UsageError for a steady wind that does not take gusts over an aircraft which holds its position."""
+    from sbs_sim.model.wind import MIN_TURBULENCE_AIRSPEED
+
+    if not arguments.wind >= MIN_TURBULENCE_AIRSPEED:
+        allowed = f"at least {MIN_TURBULENCE_AIRSPEED:g} m/s, which takes {what} over the aircraft"
+        raise UsageError(f"--wind {arguments.wind:g}: allowed is {allowed}")
+
+
 def _rule_gusts(arguments: argparse.Namespace) -> dict[str, tuple["Wind", float, float]]:
     """Gusts of a rule that arrive after the integrals have settled."""
     from sbs_sim.flight.gust_standards import certification_gust
-    from sbs_sim.model.wind import MIN_TURBULENCE_AIRSPEED, Wind
+    from sbs_sim.model.wind import Wind
 
-    if not arguments.wind >= MIN_TURBULENCE_AIRSPEED:
-        allowed = f"at least {MIN_TURBULENCE_AIRSPEED:g} m/s, which takes the gusts of --rule over the aircraft"
-        raise UsageError(f"--wind {arguments.wind:g}: allowed is {allowed}")
+    _check_passing(arguments, "the gusts of --rule")
     airs = {}
     for name, to in (("ahead", "back"), ("left", "right"), ("above", "down"))[2 if arguments.rule == "cs27" else 0 :]:
         gust = certification_gust(arguments.rule, to=to, gradient=arguments.gradient)

@@ -22,6 +22,7 @@ from sbs_sim.commands import gusts as gusts_command  # noqa: E402
 from sbs_sim.commands import sweep as sweep_command  # noqa: E402
 from sbs_sim.commands.main import EXECUTABLES  # noqa: E402
 from sbs_sim.errors import SweepError  # noqa: E402
+from sbs_sim.flight.gust_file import read_gust  # noqa: E402
 from sbs_sim.nodes import usage  # noqa: E402
 from sbs_sim.nodes.endpoints import endpoints  # noqa: E402
 from sbs_sim.pilot.hover_hold import LIMITS  # noqa: E402
@@ -154,6 +155,20 @@ def test_older_spellings_work_and_are_not_documented(tmp_path):
     assert older.changes == ["a=1", "b=2"]
     for parser, old in ((linear, "--export"), (replayed, "--with"), (replayed, "--output")):
         assert old not in parser.format_help()
+
+
+@pytest.mark.parametrize(("column", "lasts"), [("time [s]", 2.0), ("distance [m]", 0.5)])
+def test_an_own_gust_is_flown_alone_after_the_integrals_have_settled(tmp_path, column, lasts):
+    """At 11 s, when a wind of 4 m/s has taken 44 m over the aircraft; the turbulence is without it."""
+    file = tmp_path / "gust.csv"
+    file.write_text(f"{column},north [m/s],east [m/s],down [m/s]\n-1,0,0,0\n0,0,0,3\n2,0,0,0\n")
+    arguments = gusts_command.make_parser().parse_args(["--gust-file", str(file)])
+    airs = gusts_command._airs(arguments, Aircraft.load("sbs"))
+    assert [name for name, (air, *_) in airs.items() if air.own_gust is not None] == ["own gust"]
+    air, settling, duration = airs["own gust"]
+    assert (air.own_gust, air.velocity) == (read_gust(file), (-4.0, 0.0, 0.0))
+    assert not any(air.turbulence_intensity)
+    assert (air.gust_delay, air.gust_distance, settling, duration) == (11.0, 44.0, 10.0, 1.0 + lasts + 12.0)
 
 
 def test_limits_are_typed_in_degrees():

@@ -337,6 +337,7 @@ MISUSES = {
     "range and values": ("sweep", "airspeed", "0", "5", "2", "--values", "1"),
     "no limit": ("gusts", "--limit", "forward"),
     "delay": ("gusts", "--delay", "101"),
+    "gusts that never come": ("gusts", "--wind", "0", "--rule", "cs29", "--gradient", "20"),
     "no time": ("gusts", "--duration", "0.5"),
     "angle in radians": ("sweep", "sideslip", "0", "1", "2"),
     "swept and given": ("sweep", "airspeed", "0", "5", "2", "--airspeed", "0"),

@@ -32,6 +32,7 @@ OPTIONS["all of these"] = QUASI_STEADY
 OPTIONS["unsteady airfoil"] = UNSTEADY
 OPTIONS["all of these, and that"] = ALL
 OPTIONS["late separation"] = {"rotors.dynamic_stall": "separation"}
+OPTIONS["stall by Leishman and Beddoes"] = {"rotors.dynamic_stall": "leishman_beddoes"}
 SPEED = 10.0  # m/s, of ticks
 TICK_PAIRS, FEW, TICKS = 25, 20, 200
 GUST = {"turbulence_intensity": (1.0, 1.0, 1.0), "turbulence_airspeed": SPEED}

@@ -43,7 +43,7 @@ from sbs_sim.model.frames import ONE, hub_axes
 from sbs_sim.model.mixing import mixed
 from sbs_sim.model.packing import by_blades, lane_count, side_by_side
 from sbs_sim.model.records import QUAD, Model
-from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, SPEED, SWASHPLATE_NAMES, StateLayout
+from sbs_sim.model.state import CONTROL_AXES, CONTROL_NAMES, SECTION_NAMES, SPEED, SWASHPLATE_NAMES, StateLayout
 
 MAX_CHANGES_SHOWN = 5  # in a refusal
 TYPICAL_ANGLE = 0.3  # rad; the range of a control that is no angle counts as that in trims
@@ -232,19 +232,22 @@ class Aircraft(Description):
             tuple(drive.state_names for drive in self.drives),
             len(self.contact_points) if self.has_contact else 0,
             tuple(rotor.has_wake_states for rotor in self.rotors),
-            self._separations if self.has_separation else 0,
+            self._sections if self.section_states else 0,
+            self.section_states,
         )
 
     @property
-    def _separations(self) -> int:
+    def _sections(self) -> int:
         """Sections of all blades, which have room in eights of two quads (`sbs_sim.model.records`)."""
         quads = sum(-(-rotor.blades // QUAD) for rotor in self.rotors)
         return -(-quads // 2) * 2 * QUAD * self.options.elements
 
     @property
-    def has_separation(self) -> bool:
-        """Sections of a rotor have separation that follows the flow late."""
-        return any(rotor.has_late_separation for rotor in self.rotors)
+    def section_states(self) -> int:
+        """States of every section: 0 of steady ones, 1 of late separation, 4 with a vortex."""
+        if any(rotor.has_stall_vortex for rotor in self.rotors):
+            return len(SECTION_NAMES)
+        return int(any(rotor.has_late_separation for rotor in self.rotors))
 
     @property
     def has_contact(self) -> bool:
@@ -565,11 +568,12 @@ class Aircraft(Description):
 
     @cached_property
     def stall_table(self) -> Array:
-        """What is known of the stall of every airfoil of every rotor, shape (n_rotors, airfoils, 7, n).
+        """What is known of the stall of every airfoil of every rotor, shape (n_rotors, airfoils, 10, n).
 
         Reynolds or Mach numbers, the highest and lowest angle of attack [rad] at which the section is not stalled, the
-        least and largest number for which the table holds, slope of the lift of attached flow [1/rad], and angle
-        without lift [rad]; filled up with copies of the last.
+        least and largest number for which the table holds, slope of the lift of attached flow [1/rad], angle without
+        lift [rad], lift coefficients at the lowest and the highest angle, and 1 over the distance from the number
+        before, 0 for the first; filled up with copies of the last.
         """
         size = max(len(table.numbers) for tables in self.sections for table in tables)
         most = max(map(len, self.sections))

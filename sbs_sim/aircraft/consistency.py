@@ -13,6 +13,7 @@ from sbs_sim.aircraft.description import CONTACT, STAND_AXES, TRIMMED_CONTROLS, 
 from sbs_sim.aircraft.part_consistency import part_problems
 from sbs_sim.model.airfoil import FINEST_DEG, MAX_HALF, NUMBER_NAMES, common_half
 from sbs_sim.model.descent import POWER_FACTOR
+from sbs_sim.model.separation import STALL_LAGS
 from sbs_sim.model.state import CONTROL_NAMES, EULER_NAMES, SWASHPLATE_NAMES
 from sbs_sim.model.unsteady_airfoil import STATION
 
@@ -357,6 +358,8 @@ def _rotor_problems(rotor: Rotor) -> list[str]:
     of_duct = (rotor.duct_turning, rotor.ram_recovery, rotor.lip_arm, rotor.lip_stall)
     if rotor.duct_exit is None and of_duct != (1.0, 1.0, 0.0, None):
         problems.append("duct.exit_area: missing; allowed is 0.25 to 4")
+    if not rotor.has_stall_vortex and rotor.stall_lags != STALL_LAGS:
+        problems.append("stall_lags: allowed only with dynamic_stall = leishman_beddoes")
     for i, entry in enumerate(rotor.schedule):
         problems += [f"schedule[{i}].{problem}" for problem in _schedule_problems(entry)]
     problems += _range_problems("collective_range_deg", rotor.collective_range)
@@ -385,7 +388,7 @@ def _offset_problems(aircraft: "Aircraft", rotor: Rotor) -> list[str]:
     if any(one.tip_loss_model != "factor" or one.profile_drag != "section" for one in aircraft.rotors):
         allowed = "allowed where a rotor of the aircraft has offsets of its blades are factor and section"
         problems.append(f"tip_loss_model, profile_drag: {allowed}")
-    if aircraft.has_separation:
+    if aircraft.section_states:
         problems.append("dynamic_stall: allowed where a rotor of the aircraft has offsets of its blades is none")
     if rotor.undersling and not rotor.is_teetering:
         problems.append(f"undersling = {rotor.undersling:g}: allowed is 0 where flap_hinge is not teetering")

@@ -35,6 +35,7 @@ from sbs_sim.aircraft.declaration import (
     string,
 )
 from sbs_sim.content import ByContent
+from sbs_sim.model.separation import OYE_LAG, STALL_LAGS
 from sbs_sim.model.state import (
     COMMAND_NAMES,
     CONTROL_AXES,
@@ -717,10 +718,43 @@ class Rotor(ByContent):
         default="steady",
     )
     dynamic_stall: str = choice(
-        "none: stall by the table at once; separation: the point of separation follows the flow late, in flights; trims"
-        " and linear models have the table",
-        ("none", "separation"),
+        "none: stall by the table at once; separation: the point of separation follows the flow late, in flights;"
+        " leishman_beddoes: with the vortex that the leading edge sheds; trims and linear models have the table",
+        ("none", "separation", "leishman_beddoes"),
         default="none",
+    )
+    pressure_lag: float = number(
+        "Time in which the pressure at the leading edge follows the flow, in semi-chords that this goes; with"
+        " dynamic_stall = leishman_beddoes, as the three below",
+        0.5,
+        50,
+        key="stall_lags.pressure",
+        symbol="T_p",
+        default=STALL_LAGS[0],
+    )
+    boundary_lag: float = number(
+        "Time in which the separation follows that pressure",
+        0,
+        100,
+        key="stall_lags.separation",
+        symbol="T_f",
+        default=STALL_LAGS[1],
+    )
+    vortex_lag: float = number(
+        "Time in which the lift of the vortex decays",
+        0.5,
+        100,
+        key="stall_lags.vortex",
+        symbol="T_v",
+        default=STALL_LAGS[2],
+    )
+    vortex_passage: float = number(
+        "Time in which the vortex passes over the chord",
+        0,
+        100,
+        key="stall_lags.passage",
+        symbol="T_{vl}",
+        default=STALL_LAGS[3],
     )
     swashplate_phase: float = number("Phase of the swashplate against the blades", -360, 360, "deg", symbol=r"\psi_s")
     airfoil: str = string("Airfoil table: a name in config/airfoils, or a path", is_physics=False)  # its table counts
@@ -948,6 +982,29 @@ class Rotor(ByContent):
     def has_late_separation(self) -> bool:
         """Separation on its sections follows the flow late."""
         return self.dynamic_stall != "none"
+
+    @property
+    def has_stall_vortex(self) -> bool:
+        """The leading edge of its sections sheds a vortex."""
+        return self.dynamic_stall == "leishman_beddoes"
+
+    @property
+    def pressure_rate(self) -> float:
+        """Rate at which the pressure at the leading edge follows the flow in hover at most [1/s]."""
+        stations = np.linspace(0.0, self.blade_length, 101)
+        velocity = (self.hinge_offset + stations) * self.speed
+        fastest = float((2.0 * velocity / self.chord_at(stations / self.blade_length)).max())
+        return fastest / self.pressure_lag if self.has_stall_vortex else 0.0
+
+    @property
+    def stall_lags(self) -> tuple[float, ...]:
+        """Times of pressure, separation, vortex and its passage, in semi-chords."""
+        return self.pressure_lag, self.boundary_lag, self.vortex_lag, self.vortex_passage
+
+    @property
+    def separation_lag(self) -> float:
+        """Time in which the point of separation follows the flow, in semi-chords."""
+        return self.pressure_lag + self.boundary_lag if self.has_stall_vortex else OYE_LAG
 
     @property
     def lag_damping_factors(self) -> Array:

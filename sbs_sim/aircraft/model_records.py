@@ -17,7 +17,6 @@ from sbs_sim.model.airfoil import DEGREE, AirfoilTable, Grid, cell_grid, cells, 
 from sbs_sim.model.elementary import cosine_and_sine
 from sbs_sim.model.frames import hub_axes
 from sbs_sim.model.section_options import NO_TIP_LOSS, TIP_LOSS
-from sbs_sim.model.separation import LAG
 from sbs_sim.model.solve import length
 from sbs_sim.model.state import (
     ENGINE_TORQUE,
@@ -206,11 +205,11 @@ def _switches(aircraft: "Aircraft") -> NDArray[Any]:
     switches["complete_hub_moment"] = aircraft.options.hub_moment == "complete"
     if any(rotor.tip_loss_model == "prandtl" for rotor in aircraft.rotors):
         switches["section_options"] = TIP_LOSS
-    elif aircraft.has_separation or any(rotor.profile_drag == "oblique" for rotor in aircraft.rotors):
+    elif aircraft.section_states or any(rotor.profile_drag == "oblique" for rotor in aircraft.rotors):
         switches["section_options"] = NO_TIP_LOSS
     switches["stand"] = aircraft.body.is_stand
     switches["scheduled"] = any(rotor.schedule for rotor in aircraft.rotors)
-    switches["has_separation"] = switches["late_stall"] = aircraft.has_separation
+    switches["section_states"], switches["late_stall"] = aircraft.section_states, aircraft.section_states > 0
     switches["unsteady_airfoil"] = any(rotor.has_wake_states for rotor in aircraft.rotors)
     switches["ducts"] = any(rotor.duct_exit is not None for rotor in aircraft.rotors)
     switches["contact"] = aircraft.has_contact
@@ -286,6 +285,10 @@ def _blade_values(aircraft: "Aircraft", rotor: Rotor, number: int, grid: Grid) -
         "tip_blades": rotor.blades if rotor.tip_loss_model == "prandtl" else 0,
         "element_width": (rotor.blade_length - rotor.root_cutout) / aircraft.options.elements / rotor.radius,
         "late_stall": rotor.has_late_separation,
+        "stall_vortex": rotor.has_stall_vortex,
+        "inverse_pressure_lag": 1.0 / rotor.pressure_lag,
+        "inverse_vortex_lag": 1.0 / rotor.vortex_lag,
+        "vortex_passage": rotor.vortex_passage,
         "oblique_drag": rotor.profile_drag == "oblique",
         **_wake_values(aircraft, rotor),
         "first_alpha": first_angle,
@@ -504,7 +507,9 @@ def _elements(aircraft: "Aircraft", first_rows: list[list[int]]) -> NDArray[Any]
         elements["airfoil"][j], elements["first_row"][j] = airfoil, np.array(first_rows[j])[airfoil]
         elements["cos_sweep"][j] = 1.0
         if rotor.has_late_separation:
-            elements["separation_rate"][j] = 1.0 / (LAG * elements["chord"][j])
+            elements["separation_rate"][j] = 2.0 / (rotor.separation_lag * elements["chord"][j])
+        if rotor.has_stall_vortex:
+            elements["inverse_semi_chord"][j] = 2.0 / elements["chord"][j]
         if rotor.has_offsets:
             _set_offsets(aircraft, j, elements[j])
     return elements

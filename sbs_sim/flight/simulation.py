@@ -50,6 +50,7 @@ AZIMUTH_STEPS = (math.radians(0.01), math.radians(45.0))  # rad
 AZIMUTH_STEP_DEG = 14.4  # by default: docs/speed.md has its errors
 AZIMUTH_STEP = math.radians(AZIMUTH_STEP_DEG)
 
+STALL_STEPS = 0.6  # steps in the time of a pressure lag in hover: half again the airspeed is stable by every method
 # A tick is one uninterrupted call of compiled code; this many steps take it a tenth of a second.
 MAX_STEPS_PER_TICK = 10_000
 MAX_WIND_TICKS = 1_000_000_000  # that turbulence is brought forward by for a log that begins in mid-flight: minutes
@@ -62,6 +63,7 @@ PLAUSIBLE_VELOCITY = 350.0  # m/s
 PLAUSIBLE_RATE = 100.0  # rad/s
 PLAUSIBLE_ANGLE = 1.5  # rad, multiblade coordinates of flap and lag
 PLAUSIBLE_SHARE = 2.0  # of the chord that is attached, or flow across the chord over the tip speed
+PLAUSIBLE_LIFT = 200.0  # of pressure and vortex, and age of the vortex in semi-chords
 PLAUSIBLE_INFLOW = 1.0
 PLAUSIBLE_SPEED = 3.0  # of rotors, over that of the file
 PLAUSIBLE_TURNS = 1e9  # rad
@@ -136,7 +138,8 @@ class Simulation:
         self.tick = tick
         fastest = max(rotor.speed for rotor in aircraft.rotors)
         # the margin keeps a step that is right but for rounding from being cut once more
-        self.steps_per_tick = max(1, math.ceil(fastest * tick / azimuth_step * (1 - 1e-12)))
+        rates = [fastest / azimuth_step, *(STALL_STEPS * rotor.pressure_rate for rotor in aircraft.rotors)]
+        self.steps_per_tick = max(1, math.ceil(max(rates) * tick * (1 - 1e-12)))
         if self.steps_per_tick > MAX_STEPS_PER_TICK:
             raise SimulationError(
                 f"azimuth_step = {math.degrees(azimuth_step):g} deg takes {self.steps_per_tick} steps in a tick of"
@@ -535,7 +538,8 @@ def plausible_bounds(aircraft: Aircraft) -> Array:
         bounds[layout.flap(j)] = bounds[layout.lag(j)] = PLAUSIBLE_ANGLE
         bounds[layout.flap_rate(j)] = bounds[layout.lag_rate(j)] = PLAUSIBLE_ANGLE * 10 * rotor.speed
         bounds[layout.wake(j)] = PLAUSIBLE_SHARE
-    bounds[layout.separations_start :] = PLAUSIBLE_SHARE
+    bounds[layout.section("attached_share")] = PLAUSIBLE_SHARE
+    bounds[layout.section("pressure_lift").start :] = PLAUSIBLE_LIFT
     for i in range(len(layout.drives)):
         speed, places = aircraft.drive_speed(i), layout.drive(i)
         bounds[list(places.values())] = 1e9

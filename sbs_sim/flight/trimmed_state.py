@@ -76,22 +76,30 @@ def trimmed_state(
 
 
 def with_steady_separation(aircraft: Aircraft, state: Array, swashplate: Array, wind: ArrayLike) -> Array:
-    """Simulation state whose sections have the separation that stays in the flow at the azimuth 0.
+    """Simulation state whose sections have the separation that stays in the flow at the azimuth 0, and no vortex.
 
-    The rates are straight lines over the shares: two of them say where they vanish. Sections without flow are attached.
+    The rates of attached share and pressure are straight lines over these: two of them say where they vanish. Sections
+    without flow are attached. The vortex of a stalled section has left it long ago.
     """
-    if not aircraft.has_separation:
+    if not aircraft.section_states:
         return state
-    engine, first = Engine(aircraft.arranged(True, True, "blades")), aircraft.layout.separations_start
-    found = state.copy()
+    engine, layout, found = Engine(aircraft.arranged(True, True, "blades")), aircraft.layout, state.copy()
     given = [engine.lanes([np.ravel(swashplate)]), engine.memory(len(aircraft.rotors))]
     air, out, rates = engine.lanes([np.asarray(wind, dtype=float)]), engine.memory(len(state)), []
-    for share in (0.0, 1.0):
-        found[first:] = share
+    for value in (0.0, 1.0):
+        found[layout.sections_start :] = value
         engine.derivative(engine.model, engine.lanes([found]), *given, air, engine.work, out, False)
-        rates.append(out[first:, 0].copy())
+        rates.append(out[:, 0].copy())
     slope = rates[0] - rates[1]
-    found[first:] = np.where(slope > 0.0, rates[0] / np.where(slope > 0.0, slope, 1.0), 1.0)
+    settled = np.where(slope > 0.0, rates[0] / np.where(slope > 0.0, slope, 1.0), 1.0)
+    found[layout.sections_start :] = 0.0
+    for name in ("attached_share", "pressure_lift"):
+        found[layout.section(name)] = settled[layout.section(name)]
+    if layout.section_states > 1:
+        ages = layout.section("vortex_age")
+        engine.derivative(engine.model, engine.lanes([found]), *given, air, engine.work, out, False)
+        long = max(rotor.vortex_passage for rotor in aircraft.rotors)
+        found[ages] = np.where(out[ages, 0] > 0.0, long, 0.0)
     return found
 
 
@@ -121,7 +129,7 @@ def standing_state(
     state = np.zeros(aircraft.layout.size)
     state[: S.ATTITUDE] = position
     state[S.ATTITUDE : S.VELOCITY] = euler_to_quaternion(heading, 0.0, 0.0)
-    state[aircraft.layout.separations_start :] = 1.0
+    state[aircraft.layout.section("attached_share")] = 1.0
     for i in range(len(aircraft.drives)):
         state[aircraft.layout.drive(i)[S.SPEED]] = aircraft.drive_speed(i)
     return slowed(aircraft, state, rotor_speed)

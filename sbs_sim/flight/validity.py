@@ -171,8 +171,9 @@ def warnings(aircraft: Aircraft, rows: Array | Sequence[Sequence[float]]) -> lis
         if state.advance_ratio > MAX_ADVANCE_RATIO:
             found.append(f"{rotor.name}: advance ratio above {MAX_ADVANCE_RATIO:g}")
         if state.stalled_share > MAX_STALLED:
-            dynamics = "the vortex of its dynamics" if rotor.has_late_separation else "its dynamics"
-            found.append(f"{rotor.name}: {STALL} {MAX_STALLED:.0%} of the disc, without {dynamics}")
+            missing = "what a vortex does of its dynamics" if rotor.has_late_separation else "its dynamics"
+            missing = "the pitching moment of its dynamics" if rotor.has_stall_vortex else missing
+            found.append(f"{rotor.name}: {STALL} {MAX_STALLED:.0%} of the disc, without {missing}")
         if (least := LEAST_HEIGHTS.get(aircraft.ground.effect)) and float(row[W.HEIGHT]) < least:
             found.append(f"{rotor.name}: below {least:g} radii above the ground, where the ground effect is not known")
         if float(row[W.BEHIND]) > MAX_BEHIND:

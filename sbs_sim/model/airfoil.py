@@ -92,9 +92,14 @@ class AirfoilTable(ByContent):
 
     @cached_property
     def stall(self) -> Array:
-        """What `sbs_sim.Aircraft.stall_table` has of it, shape (7, n)."""
-        ends = (np.full(len(self.numbers), end) for end in self.range)
-        return np.array([self.numbers, *stall_angles(self), *ends, *attached_lift(self)])
+        """What `sbs_sim.Aircraft.stall_table` has of it, shape (10, n)."""
+        ends, (highest, lowest) = (np.full(len(self.numbers), end) for end in self.range), stall_angles(self)
+        limits = [
+            [np.interp(angle, self.alpha, cl) for angle, cl in zip(angles, self.cl, strict=True)]
+            for angles in (lowest, highest)
+        ]
+        widths = np.concatenate([[0.0], 1.0 / np.diff(self.numbers)])
+        return np.array([self.numbers, highest, lowest, *ends, *attached_lift(self), *limits, widths])
 
     @property
     def knots(self) -> Array:

@@ -343,7 +343,9 @@ def set_rates(aircraft, memory, flight, dx):
 @kernel
 def separation_of(aircraft, memory, r):
     """Separation on the sections of a register r of blades."""
-    return Separation(memory.separation, memory.separation_rates, aircraft.stall[r])
+    states = aircraft.switches[0].section_states
+    kind = memory.separation.shape[0] // states if states > 0 else 0
+    return Separation(memory.separation, memory.separation_rates, aircraft.stall[r], kind)
 
 
 @kernel

@@ -52,8 +52,8 @@ SWITCHES = {
     "teetering": INTEGER,  # 1 where a rotor is
     "wash": INTEGER,  # 1 where something adds to the inflow of a rotor, see `sbs_sim.model.dynamics.set_wash`
     "unsteady_airfoil": INTEGER,  # 1 where a rotor has one
-    "has_separation": INTEGER,  # 1 where a rotor has late separation
-    "late_stall": INTEGER,  # 1 where it is met, 0 for steady sections
+    "section_states": INTEGER,  # of a section: 0, 1 of late separation, or 4 with vortices
+    "late_stall": INTEGER,  # 1 where they are met, 0 for steady sections
     "ground_effect": INTEGER,  # see `sbs_sim.model.ground_effect`
     "interference": INTEGER,  # 1 where rotors meet the wash of one another
     "ring": INTEGER,  # 1 where the thrust of a rotor fluctuates in the vortex ring
@@ -176,6 +176,10 @@ BLADE = {
     "wake_slow_rate": LANES,  # 2 b_1 / c, 2 b_2 / c [1/m]; 0 also for what fills up a quad
     "wake_fast_rate": LANES,
     "late_stall": LANES,  # 1 for late separation
+    "stall_vortex": LANES,  # 1 for a vortex with it, whose times are in semi-chords
+    "inverse_pressure_lag": LANES,
+    "inverse_vortex_lag": LANES,
+    "vortex_passage": LANES,
     "oblique_drag": LANES,  # 1 for drag along the local flow, the one along the span included
     "first_alpha": LANES,  # of the airfoil table [rad]
     "inverse_alpha_step": LANES,
@@ -186,7 +190,7 @@ BLADE = {
     "starts_quad": INTEGER,  # 1 for the first of a quad, 0 for those that follow it
     "elements": INTEGER,
     "harmonics": INTEGER,
-    "separation_first": INTEGER,  # row of the first section among those of `Work.separation`
+    "separation_first": INTEGER,  # row of the first section among those of `Work.separation`, and of each kind there
     "separation_stride": INTEGER,  # rows from a section to the next
 }
 DRIVE = {
@@ -242,6 +246,7 @@ ELEMENT = {
     "airfoil": LANES,  # number of the airfoil from the root outwards
     "number_scale": LANES,  # of the airfoil table over the airspeed: c / nu of Reynolds numbers, 1 / a of Mach numbers
     "separation_rate": LANES,  # of the lag of separation over the airspeed [1/m]
+    "inverse_semi_chord": LANES,  # 1/m
     "offset_along": LANES,  # of the quarter chord from the pitch axis at zero pitch, and normal to it
     "offset_up": LANES,
     "cos_sweep": LANES,
@@ -429,7 +434,7 @@ class Model(NamedTuple):
     table : ndarray, shape (cells, 16)
         Of every cell of the airfoil tables the coefficients of x^0 to x^3, each for lift and drag and for their slopes
         over the Reynolds or Mach number, see `sbs_sim.model.airfoil.cells`.
-    stall : ndarray, shape (registers, airfoils, 5, k, width)
+    stall : ndarray, shape (registers, airfoils, 10, k, width)
         See `Aircraft.stall_table`.
     surfaces, fuselages : structured ndarray, shapes (surfaces,), (fuselages,)
         Lifting surfaces, and a fuselage with tables or none.
@@ -523,8 +528,9 @@ class Work(NamedTuple):
     pitch_sums : structured ndarray, shape (quads,)
         Of such blades that a drive turns, else empty.
     separation, separation_rates : ndarray, shape (rows, width)
-        Attached shares of the chord of sections with late separation, and their rates [1/s]; else empty.
-    separation_states, separation_state_rates : ndarray, shape (separations, n)
+        What `sbs_sim.model.state.SECTION_NAMES` says of sections with late separation, one kind after the other, and
+        the rates; else empty.
+    separation_states, separation_state_rates : ndarray, shape (section states, n)
         The same memory.
     gusts : ndarray, shape (registers, elements, 3, width)
         `Space.elements`.
@@ -564,11 +570,10 @@ class Work(NamedTuple):
 
 
 def separation_count(model: Model) -> int:
-    """Sections with room for late separation: those of all blades, in eights of two quads; 0 where no rotor has it."""
-    if not model.switches["has_separation"][0]:
-        return 0
+    """States of sections with room for late separation: those of all blades, in eights of two quads."""
     quads = int(sum(-(-int(blades) // QUAD) for blades in model.rotors["blades"]))
-    return -(-quads // 2) * 2 * QUAD * model.elements.shape[1]
+    sections = -(-quads // 2) * 2 * QUAD * model.elements.shape[1]
+    return int(model.switches["section_states"][0]) * sections
 
 
 def state_size(model: Model) -> int:

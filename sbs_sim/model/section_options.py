@@ -13,7 +13,7 @@ from sbs_sim.model.blade import to_blade
 from sbs_sim.model.element_gusts import free_gust_at, gust_at
 from sbs_sim.model.kernel import kernel
 from sbs_sim.model.section import DEGREE, AirLoads, SectionFlow, SpanFlow, find_section
-from sbs_sim.model.separation import late_lift
+from sbs_sim.model.separation import late_coefficients
 from sbs_sim.model.trigonometry import TINY, angle_of, small_arcsine
 
 GAUSS = 0.5 / math.sqrt(3.0)  # of an element from its middle: points of the mean with two values
@@ -177,13 +177,7 @@ def optional_loads(air, blade, elements, knots, table, strip, flow, along, pitch
         lift, lift_slope, drag, drag_slope = table_row(table, section.row, section.fraction, DEGREE)
         pressure = air.density * element.half_area
         share = section.tip_factor * element.lift_factor
-        coefficient = lift + lift_slope * section.number
-        if switches.late_stall == 1:
-            alpha = pitch + element.twist - angle_of(u_p, u_t, 1.0 / section.airspeed)
-            coefficient = coefficient + late_lift(
-                blade, element, separation, i, section.number, section.airspeed, alpha, coefficient
-            )
-        lift_gain = coefficient * (pressure * section.airspeed * share)
+        lift_gain = (lift + lift_slope * section.number) * (pressure * section.airspeed * share)
         speed = sqrt(section.airspeed * section.airspeed + u_r * u_r)
         drag_gain = (drag + drag_slope * section.number) * (pressure * speed)
         up = lift_gain * u_t - drag_gain * u_p
@@ -197,4 +191,51 @@ def optional_loads(air, blade, elements, knots, table, strip, flow, along, pitch
             given = given + dot(load, gust_at(gusts, i))
             given_free = given_free + dot(load, free_gust_at(gusts, i))
     loads = AirLoads(normal_force, forward_force, normal_moment, forward_moment)
+    if switches.late_stall == 1:
+        late = late_loads(air, blade, elements, table, strip, flow, pitch, separation, gusts)
+        added = late.loads
+        loads = AirLoads(
+            normal_force + added.normal_force,
+            forward_force + added.forward_force,
+            normal_moment + added.normal_moment,
+            forward_moment + added.forward_moment,
+        )
+        given, given_free = given + late.powers.met, given_free + late.powers.free
     return loads, outward_force, outward_moment, GustPowers(given, given_free)
+
+
+class LateLoads(NamedTuple):
+    """Loads of blades beside those of steady sections, and what they take of gusts."""
+
+    loads: Any
+    powers: Any
+
+
+@kernel
+def late_loads(air, blade, elements, table, strip, flow, pitch, separation, gusts):
+    """What the stall of sections in motion adds to the air loads of steady ones; sets the rates of its states.
+
+    A loop of its own: in that of all sections it would cost those without it a tenth of the derivative.
+    """
+    normal_force = forward_force = normal_moment = forward_moment = given = given_free = zeros_like(pitch)
+    for i in range(elements.shape[0]):
+        element, section, own = elements[i], strip[i], flow_at(flow, gusts, i)
+        s = element.span
+        u_t, u_p = own.u_t_hinge + own.u_t_slope * s, own.u_p_hinge + own.u_p_slope * s
+        lift, lift_slope, _, _ = table_row(table, section.row, section.fraction, DEGREE)
+        alpha = pitch + element.twist - angle_of(u_p, u_t, 1.0 / section.airspeed)
+        steady = lift + lift_slope * section.number
+        late = late_coefficients(blade, element, separation, i, section, alpha, steady)
+        scale = (air.density * element.half_area) * section.airspeed
+        lift_gain = late.lift * (scale * rounded(section.tip_factor * element.lift_factor))
+        drag_gain = rounded(late.drag * scale)
+        up = lift_gain * u_t - drag_gain * u_p
+        rearward = lift_gain * u_p + drag_gain * u_t
+        normal_force, forward_force = normal_force + up, forward_force - rearward
+        normal_moment, forward_moment = normal_moment + s * up, forward_moment - s * rearward
+        if gusts is not None:
+            load = Vector(zeros_like(pitch), -rearward, up)
+            given = given + dot(load, gust_at(gusts, i))
+            given_free = given_free + dot(load, free_gust_at(gusts, i))
+    loads = AirLoads(normal_force, forward_force, normal_moment, forward_moment)
+    return LateLoads(loads, GustPowers(given, given_free))

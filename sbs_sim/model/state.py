@@ -20,8 +20,8 @@ each drive the azimuth of its first rotor (rad), the share of the battery that i
 that has failed.
 
 Behind these are, of an aircraft that can stand on the ground, the deflections of each of its contact points along the
-ground (m), which the linear state does not have either. Last are, of an aircraft with late separation, the attached
-shares of the chord of all sections (theory.md section 4.10), likewise.
+ground (m), which the linear state does not have either. Last are, of an aircraft with late separation, what
+`SECTION_NAMES` says of all sections (theory.md section 4.10), likewise.
 """
 
 import re
@@ -60,6 +60,9 @@ UNSEEN_NAMES = ("azimuth", "discharge", "engine_failure")  # of a drive, and not
 AZIMUTH, DISCHARGE, FAILURE = range(3)  # of UNSEEN_NAMES
 CONTACT_NAMES = ("contact_x", "contact_y")  # of a contact point
 CONTACT_STATES = len(CONTACT_NAMES)
+# of a section in stall: share of the chord that is attached, lift coefficient of the pressure at the leading edge,
+# normal force coefficient of the vortex, and its age in semi-chords that the flow went
+SECTION_NAMES = ("attached_share", "pressure_lift", "vortex_lift", "vortex_age")
 COMMAND_NAMES = ("throttle", "set_point")  # of a drive that pilot controls act on
 THROTTLE, SET_POINT = range(2)  # of COMMAND_NAMES
 ROW = len(SWASHPLATE_NAMES)  # numbers in a row of commands: a swashplate's, or a drive's and what is left at zero
@@ -170,15 +173,18 @@ class StateLayout:
         Number of points that can touch the ground.
     wakes : tuple of bool
         Which rotors have an unsteady airfoil; none if empty.
-    separations : int
-        Sections whose separation is a state.
+    sections : int
+        Sections whose stall has states, and room for those.
+    section_states : int
+        Of each: the first ones of `SECTION_NAMES`.
     """
 
     blades: tuple[int, ...]
     drives: tuple[tuple[str, ...], ...] = ()
     contacts: int = 0
     wakes: tuple[bool, ...] = ()
-    separations: int = 0
+    sections: int = 0
+    section_states: int = 0
 
     @cached_property
     def blade_count(self) -> int:
@@ -188,11 +194,11 @@ class StateLayout:
     @cached_property
     def size(self) -> int:
         """Length of the simulation state."""
-        return self.separations_start + self.separations
+        return self.sections_start + self.sections * self.section_states
 
     @cached_property
-    def separations_start(self) -> int:
-        """Index of the first attached share of the chord of a section."""
+    def sections_start(self) -> int:
+        """Index of the first state of a section."""
         return self.contacts_start + CONTACT_STATES * self.contacts
 
     @cached_property
@@ -267,13 +273,23 @@ class StateLayout:
         first = self.contacts_start + CONTACT_STATES * point
         return slice(first, first + CONTACT_STATES)
 
+    def section(self, name: str) -> slice:
+        """Indices of one of `SECTION_NAMES` of all sections in the simulation state; empty where they have none."""
+        first = self.sections_start + self.sections * SECTION_NAMES.index(name)
+        return slice(first, first + self.sections) if name in self.section_names else slice(first, first)
+
+    @property
+    def section_names(self) -> tuple[str, ...]:
+        """Those of `SECTION_NAMES` that the sections have."""
+        return SECTION_NAMES[: self.section_states]
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the simulation state."""
         body = ("north", "east", "down", "qw", "qx", "qy", "qz", "u", "v", "w", "p", "q", "r")
         unseen = [f"{name}({i + 1})" for i in range(len(self.drives)) for name in UNSEEN_NAMES]
         unseen += [f"{name}({i + 1})" for i in range(self.contacts) for name in CONTACT_NAMES]
-        unseen += [f"attached_share({i + 1})" for i in range(self.separations)]
+        unseen += [f"{name}({i + 1})" for name in self.section_names for i in range(self.sections)]
         return body + self._rotor_names + self._drive_names + tuple(unseen)
 
     @cached_property

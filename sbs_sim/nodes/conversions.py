@@ -362,7 +362,7 @@ class StateMessages:
         self.inflow = InflowArray(rotors=[Inflow() for _ in range(count)])
         for j, inflow in enumerate(self.inflow.rotors):
             inflow.wake = [ShedWake() for _ in self._layout.wake_pairs(j)]
-        self.inflow.sections = [SectionState() for _ in range(self._layout.separations)]
+        self.inflow.sections = [SectionState() for _ in range(self._layout.sections)]
         self.inflow.header.frame_id = FRAME_BODY
         self.odom = Odometry(child_frame_id=FRAME_BASE)
         self.odom.header.frame_id = FRAME_ODOM
@@ -377,8 +377,9 @@ class StateMessages:
         if snapshot.contact is not None:
             self._fill_contacts(values, snapshot.contact.tolist())
         self._fill_odom(values)
-        for section, share in zip(self.inflow.sections, values[self._layout.separations_start :], strict=True):
-            section.attached_share = share
+        for name in self._layout.section_names:
+            for section, value in zip(self.inflow.sections, values[self._layout.section(name)], strict=True):
+                setattr(section, name, value)
         flaps, lags = self._blades.of(snapshot)
         loads = snapshot.loads.tolist()
         azimuth = snapshot.azimuth.tolist()
@@ -500,11 +501,12 @@ def snapshot_of(
     if wakes != expected:
         problem = f"{wakes} coordinates of wakes, {aircraft.name} has {expected}"
         raise SimulationError(f"the flight has rotors with {problem}")
-    if len(inflow.sections) != layout.separations:
-        problem = f"{len(inflow.sections)} sections with separation, {aircraft.name} has {layout.separations}"
+    if len(inflow.sections) != layout.sections:
+        problem = f"{len(inflow.sections)} sections with separation, {aircraft.name} has {layout.sections}"
         raise SimulationError(f"the flight has {problem}")
     state = np.empty(layout.size)
-    state[layout.separations_start :] = [section.attached_share for section in inflow.sections]
+    for name in layout.section_names:
+        state[layout.section(name)] = [getattr(section, name) for section in inflow.sections]
     state[: S.BODY_SIZE] = body_array(body)
     for i, drive in enumerate(rotors.drives):
         for name, place in layout.drive(i).items():

@@ -173,8 +173,9 @@ class StateBytes:
             for i, (slow, fast) in enumerate(aircraft.layout.wake_pairs(j)):
                 yield f"rotors[{j}].wake[{i}].slow", (slow, 1.0)
                 yield f"rotors[{j}].wake[{i}].fast", (fast, 1.0)
-        for i in range(aircraft.layout.separations):
-            yield f"sections[{i}].attached_share", (aircraft.layout.separations_start + i, 1.0)
+        for name in aircraft.layout.section_names:
+            for i, place in enumerate(range(aircraft.layout.size)[aircraft.layout.section(name)]):
+                yield f"sections[{i}].{name}", (place, 1.0)
 
     def _odom_fields(self, _: Aircraft) -> Iterator[tuple[str, tuple[int, float]]]:
         """NED to ENU, FRD to FLU, as `StateMessages` has it."""

@@ -236,8 +236,9 @@ def _states(log: Log, aircraft: Aircraft, step_size: float) -> tuple[IntArray, A
     for i in range(len(layout.drives)):
         for name, place in layout.drive(i).items():
             states[:, place] = rotors[f"drives[{i}].{DRIVE_FIELDS.get(name, name)}"][where[1]]
-    for i in range(layout.separations):
-        states[:, layout.separations_start + i] = inflow[f"sections[{i}].attached_share"][where[2]]
+    for name in layout.section_names:
+        for i, place in enumerate(range(layout.size)[layout.section(name)]):
+            states[:, place] = inflow[f"sections[{i}].{name}"][where[2]]
     for i in range(layout.contacts):
         for axis, place in zip("xy", range(layout.size)[layout.contact(i)], strict=True):
             states[:, place] = body[f"contacts[{i}].deflection_{axis}"][where[0]]

@@ -242,7 +242,7 @@ def largest_error(aircraft, case, lead_lag=True, cyclic_inflow=True):
     expected, loads = plain_derivative(aircraft, x, swash, psi, wind, lead_lag, cyclic_inflow)
     model = Model(aircraft, lead_lag, cyclic_inflow)
     found = model.derivative(x, swash, psi, wind)
-    own = aircraft.layout.separations_start  # behind it, sections of blades that fill up a quad do what they like
+    own = aircraft.layout.sections_start  # behind it, sections of blades that fill up a quad do what they like
     found[own:][expected[own:] == 0.0] = 0.0
     errors = [(np.abs(found - expected) / group_scales(aircraft, expected)).max()]
     # What balances inside a rotor is of the order of its force, whatever is left of it in one component.

@@ -43,11 +43,13 @@ OWN = {
 }
 SECTIONS = {"tip_loss_model": "prandtl", "profile_drag": "oblique", "descent": "measured", "induced_power_factor": 1.1}
 STALL = {"dynamic_stall": "separation"}
+VORTEX = {"dynamic_stall": "leishman_beddoes"}
 LATE = {"unsteady_airfoil": "jones"}
 AIRCRAFT = {
     "sbs": lambda: Aircraft.load("sbs"),
     "ducts": lambda: build(every_rotor={"duct": DUCT, **LATE}),
     "air": lambda: build(options={"interference": "skewed_wake"}, every_rotor=SECTIONS | LATE | STALL),
+    "vortices": lambda: build(every_rotor=SECTIONS | VORTEX),
     "shares": lambda: build(every_rotor={"duct_expansion": 0.8, "induced_power_factor": 1.15}),
     "drives": lambda: Aircraft.load(DATA / "electric.yaml"),
     "tails": lambda: Aircraft.load("uh60a_genhel"),

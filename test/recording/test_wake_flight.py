@@ -16,7 +16,7 @@ from sbs_sim.recording.recorded_flight import flight_of  # noqa: E402
 
 
 def test_the_parts_of_the_circulation_are_recorded_and_come_again(tmp_path):
-    late = {"unsteady_airfoil": "jones", "dynamic_stall": "separation"}
+    late = {"unsteady_airfoil": "jones", "dynamic_stall": "leishman_beddoes"}
     data = aircraft_data(options={"elements": 8}, rotors=[{}, late])
     path = tmp_path / "late.yaml"
     path.write_text(json.dumps(data))
@@ -36,10 +36,13 @@ def test_the_parts_of_the_circulation_are_recorded_and_come_again(tmp_path):
     recorded = read(log)
     states = flight_of(recorded).states
     parts = [recorded["inflow"][f"rotors[1].wake[0].{name}"] for name in ("slow", "fast")]
-    assert states.shape[1] == 13 + 24 + 6 + 6 + 8 * 8
+    assert states.shape[1] == 13 + 24 + 6 + 6 + 4 * 8 * 8
     assert np.isin(states[:, 43], parts[0]).all(), "the slow one of the collective coordinate"
     tip = recorded["inflow"]["sections[60].attached_share"]  # of the first blade of the second rotor
     assert tip.min() < tip.max() <= 1.0
     assert np.isin(states[:, 49 + 60], tip).all()
+    pressure = recorded["inflow"]["sections[60].pressure_lift"]
+    assert pressure.max() > 0.2
+    assert np.isin(states[:, 49 + 64 + 60], pressure).all()
     first = np.flatnonzero(parts[1] < 0.03)[0]
     assert parts[1][first] < parts[0][first], "the fast one is ahead"

@@ -6,7 +6,7 @@ import copy
 import numpy as np
 from balances import at_speeds, azimuths, balance, commanded, plain_state, rates_of_totals
 from helpers import POLAR, Model, mirrored_data, mirrored_state, mirrored_swash, unit
-from plain_model import inflow_rate, make_instant, rotation_matrix
+from plain_model import inflow_rate, make_instant, random_sections, rotation_matrix
 from scipy.linalg import eig
 
 from sbs_sim import Aircraft
@@ -49,8 +49,8 @@ def violent_state(model, rng):
         x[S.VELOCITY : S.BODY_SIZE] *= aircraft.body.stand_free
     if aircraft.has_contact:
         _touch(aircraft, x, rng)
-    if layout.separations:
-        x[layout.separations_start :] = rng.uniform(size=layout.separations)
+    if layout.sections:
+        x[layout.sections_start :] = random_sections(aircraft, rng)
     return x
 
 

@@ -150,11 +150,11 @@ def split_state(ac, x, lead_lag=True, cyclic_inflow=True):
     kept = np.array([1.0, 1.0, 1.0]) if cyclic_inflow else np.array([1.0, 0.0, 0.0])
     parts["inflow"] = [x[start + 3 * j : start + 3 * j + 3] * kept for j in range(len(ac.rotors))]
     start += 3 * len(ac.rotors)
-    shares = np.zeros(0)
+    kinds, stall = section_states(ac), np.zeros((0, 0))
     if count := section_count(ac):
-        x, shares = x[:-count], x[-count:]
+        x, stall = x[:-count], x[-count:].reshape(kinds, -1)
     parts["separation"] = [
-        [shares[section_places(ac, j, k)] for k in range(rotor.blades)] if len(shares) else None
+        [stall[:, section_places(ac, j, k)] for k in range(rotor.blades)] if kinds else None
         for j, rotor in enumerate(ac.rotors)
     ]
     parts["wake"] = []
@@ -215,7 +215,24 @@ def stands_on_ground(ac):
 
 def has_late_separation(rotor):
     """Return whether separation on its sections follows the flow late (section 4.10)."""
-    return getattr(rotor, "dynamic_stall", "none") == "separation"
+    return getattr(rotor, "dynamic_stall", "none") != "none"
+
+
+def has_stall_vortex(rotor):
+    """Return whether the leading edge of its sections sheds a vortex (section 4.10)."""
+    return getattr(rotor, "dynamic_stall", "none") == "leishman_beddoes"
+
+
+def section_states(ac):
+    """Return the number of states of each section (section 4.10)."""
+    return 4 if any(map(has_stall_vortex, ac.rotors)) else int(any(map(has_late_separation, ac.rotors)))
+
+
+def random_sections(ac, rng):
+    """Return states of all sections: some attached, some with a vortex that grows or has left."""
+    count = section_count(ac) // section_states(ac)
+    kinds = [rng.uniform(size=count), rng.normal(scale=2.0, size=count), rng.normal(size=count)]
+    return np.concatenate([*kinds, rng.uniform(0, 15, size=count)][: section_states(ac)])
 
 
 def section_places(ac, j, k):
@@ -229,23 +246,59 @@ def section_places(ac, j, k):
 
 def section_count(ac):
     """Return the number of states of late separation, at the end of the state; 0 without it."""
-    if not any(map(has_late_separation, ac.rotors)):
-        return 0
-    return 8 * -(-sum(-(-rotor.blades // 4) for rotor in ac.rotors) // 2) * ac.options.elements
+    return 8 * -(-sum(-(-rotor.blades // 4) for rotor in ac.rotors) // 2) * ac.options.elements * section_states(ac)
 
 
-def late_lift(airfoil, number, angle, steady, share):
-    """Return the lift coefficient of a section of whose chord a share is attached, and the share that stays there."""
+def attached_line(airfoil, number):
+    """Return the slope of the lift of attached flow [1/rad] and the angle without lift [rad]."""
     near = np.abs(airfoil.alpha) < max(np.radians(5.0), 1.5 * np.diff(airfoil.alpha)[len(airfoil.alpha) // 2])
     lines = [np.polyfit(airfoil.alpha[near], cl[near], 1) for cl in airfoil.cl]
     numbers = np.asarray(airfoil.numbers, dtype=float)
     slope = np.interp(number, numbers, [line[0] for line in lines])
-    angle = angle - np.interp(number, numbers, [-line[1] / line[0] for line in lines])
-    attached = slope * angle
+    return slope, np.interp(number, numbers, [-line[1] / line[0] for line in lines])
+
+
+def late_lift(airfoil, number, angle, steady, share):
+    """Return what a share of attached chord adds to the lift of a section, and the share that stays there."""
+    slope, no_lift = attached_line(airfoil, number)
+    attached = slope * (angle - no_lift)
     root = np.clip(2 * np.sqrt(max(steady / attached, 0.0)) - 1, 0, 1) if abs(attached) > 1e-3 else 1.0
     gap = attached * (3 + root) / (4 * (1 + root)) if root > 0 else attached - steady
-    window = np.clip((np.radians(60) - abs(angle)) / np.radians(30), 0, 1)
-    return steady + window * gap * (share - root**2), root**2
+    return stall_window(angle - no_lift) * gap * (share - root**2), root**2
+
+
+def stall_window(angle):
+    """Return how much of the dynamics of stall is met at an angle off that without lift [rad]."""
+    return np.clip((np.radians(60) - abs(angle)) / np.radians(30), 0, 1)
+
+
+def leishman_beddoes(airfoil, number, alpha, steady, states, lags=(1.7, 3.0, 6.0, 11.0)):
+    """Return what the states of a section add to its lift and drag coefficients, and their rates per semi-chord.
+
+    The times are those of pressure, separation, vortex and its passage.
+    """
+    share, pressure, vortex, age = states
+    slope, no_lift = attached_line(airfoil, number)
+    window = stall_window(alpha - no_lift)
+    attached = window * slope * (alpha - no_lift)
+    normal, staying = late_lift(airfoil, number, alpha, steady, share)
+    normal = normal + window * vortex
+    share_rate, pressure_rate = (staying - share) / (lags[0] + lags[1]), (attached - pressure) / lags[0]
+    root = np.sqrt(max(share, 1e-4))
+    growth = pressure_rate * (1 - (1 + root) ** 2 / 4) - pressure * share_rate * (1 + root) / (4 * root)
+    ends = [
+        np.interp(
+            number,
+            airfoil.numbers,
+            [np.interp(end, airfoil.alpha, cl) for end, cl in zip(own, airfoil.cl, strict=True)],
+        )
+        for own in airfoil.stall[1:3]
+    ]
+    sheds = pressure > ends[0] or pressure < ends[1]
+    feeds = sheds and age < lags[3] and growth * pressure > 0
+    rates = [share_rate, pressure_rate, (growth if feeds else 0.0) - vortex / lags[2]]
+    rates.append((1.0 if age < lags[3] else 0.0) if sheds else -age / lags[0])
+    return normal * np.cos(alpha), normal * np.sin(alpha), rates
 
 
 def has_wake(rotor):
@@ -627,7 +680,7 @@ def circulation(ac, blade, swash, inflow, air_velocity_hub, parts, air_gradient=
     return rates, tip_speed * np.array([0.165, 0.335]) @ late / 0.75
 
 
-def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=None, wake=0.0, shares=None, rates=None):
+def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=None, wake=0.0, stall=None, rates=None):
     """Return the aerodynamic force of every element of a blade.
 
     Parameters
@@ -644,10 +697,10 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=Non
         Change of the air's velocity per metre from the hub within the disc [1/s], body axes: velocity = it @ position.
     wake : float
         Wash of the blade's wake at the tip [m/s], which grows along the radius.
-    shares : array, shape (elements,), optional
-        Attached shares of the chord of its sections, of late separation.
+    stall : array, shape (states, elements), optional
+        Of its sections, of late separation: attached shares of the chord, and with a vortex three more.
     rates : list, optional
-        Output, with `shares`: their rates [1/s].
+        Output, with `stall`: their rates [1/s], a list of each section.
 
     Returns
     -------
@@ -687,12 +740,17 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=Non
         number = speed / air.speed_of_sound if airfoil.axis == "mach" else speed * chord / air.kinematic_viscosity
         alpha = pitch - np.arctan2(u_p, u_t)
         cl, cd = airfoil_coefficients(airfoil, number, alpha, ac.options.interpolation)
-        if shares is not None and has_late_separation(rotor):
-            share = shares[len(loads)]
-            cl, staying = late_lift(airfoil, number, alpha, cl, share)
-            rates.append(speed / (4 * chord) * (staying - share))
-        elif shares is not None:
-            rates.append(0.0)
+        states, late_drag = None if stall is None else stall[:, len(loads)], 0.0
+        if states is not None and has_stall_vortex(rotor):
+            late, late_drag, own = leishman_beddoes(airfoil, number, alpha, cl, states, rotor.stall_lags)
+            cl = cl + late
+            rates.append(2 * speed / chord * np.array(own))
+        elif states is not None and has_late_separation(rotor):
+            late, staying = late_lift(airfoil, number, alpha, cl, states[0])
+            cl = cl + late
+            rates.append([speed / (4 * chord) * (staying - states[0]), *np.zeros(len(states) - 1)])
+        elif states is not None:
+            rates.append(np.zeros(len(states)))
         lifting_edge = rotor.tip_loss * rotor.radius - rotor.hinge_offset
         cl = cl * np.clip((lifting_edge - inner) / ds, 0.0, 1.0)
         if rotor.tip_loss_model == "prandtl":
@@ -704,6 +762,7 @@ def blade_air_loads(ac, blade, swash, inflow, air_velocity_hub, air_gradient=Non
         force = pressure * speed * cl * (u_t * blade.n - u_p * blade.t)
         oblique = np.hypot(speed, u_r)
         force = force - pressure * oblique * cd * (u_p * blade.n + u_t * blade.t + u_r * blade.d)
+        force = force - pressure * speed * late_drag * (u_p * blade.n + u_t * blade.t)
         loads.append((s, force))
     return loads
 
@@ -1223,8 +1282,8 @@ def make_instant(ac, x, swash, psi, wind, lead_lag=True, cyclic_inflow=True, loc
             wakes = [circulation(ac, blade, *given, own, gradients[j]) for blade, own in pairs]
         wake_rates.append(np.array([rates for rates, _ in wakes]))
         wake_washes.append([wash for _, wash in wakes])
-        shares, rates = state.separation[j] or [None] * rotor.blades, [[] for _ in range(rotor.blades)]
-        rows = zip(blades[j], wakes, shares, rates, strict=True)
+        stall, rates = state.separation[j] or [None] * rotor.blades, [[] for _ in range(rotor.blades)]
+        rows = zip(blades[j], wakes, stall, rates, strict=True)
         air_loads.append(
             [blade_air_loads(ac, blade, *given, gradients[j], wash, own, out) for blade, (_, wash), own, out in rows]
         )
@@ -1370,11 +1429,11 @@ def section_rates(ac, rates):
     """Return the rates of all sections in their places; empty without late separation."""
     if not section_count(ac):
         return []
-    found = np.zeros(section_count(ac))
+    found = np.zeros((section_states(ac), section_count(ac) // section_states(ac)))
     for j, of_rotor in enumerate(rates):
         for k, own in enumerate(of_rotor):
-            found[section_places(ac, j, k)] = own
-    return [found]
+            found[:, section_places(ac, j, k)] = np.transpose(own)
+    return [found.ravel()]
 
 
 def _blade_points(ac, state, psi, swash=None):
@@ -1571,6 +1630,6 @@ def random_state(ac, rng, size=1.0):
             size * rng.normal(scale=10.0, size=count),
             *inflow,
             *(size * rng.normal(scale=0.05, size=2 * rotor.blades) for rotor in ac.rotors if has_wake(rotor)),
-            *([rng.uniform(size=ac.layout.separations)] if any(map(has_late_separation, ac.rotors)) else []),
+            *([random_sections(ac, rng)] if section_count(ac) else []),
         ]
     )

@@ -285,7 +285,7 @@ def _late_stall(data: dict[str, Any], rng: np.random.Generator) -> None:
         return
     for rotor in data["rotors"]:
         if rng.random() < 0.3:
-            rotor["dynamic_stall"] = "separation"
+            rotor["dynamic_stall"] = str(rng.choice(["separation", "leishman_beddoes"]))
 
 
 def _distribute_mass(rotor: dict[str, Any], rng: np.random.Generator) -> None:

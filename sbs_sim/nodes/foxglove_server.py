@@ -115,7 +115,11 @@ class FoxgloveServer(Component):
             self._server.add_services(self._visitors.allow(nodes, taken))
 
     def _discover(self) -> None:
-        """Serve what other processes publish, such as the frames of ROS tools and the targets of a pilot."""
+        """Serve what other processes publish, such as the frames of ROS tools and the targets of a pilot.
+
+        Clients are followed again, too: the server may tell of a subscription before its channel has it.
+        """
+        self._follow_clients()
         for name, kinds in self.get_topic_names_and_types():
             if name in (*OWN_TO_ROS, *self._topics) or not (found := self.get_publishers_info_by_topic(name)):
                 continue

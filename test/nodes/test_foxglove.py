@@ -139,9 +139,10 @@ def port_of(process):
 def flight(tmp_path_factory):
     folder = tmp_path_factory.mktemp("foxglove")
     with world(next(DOMAINS), folder) as made, world(next(DOMAINS), folder) as other:
-        serve = {"foxglove": "true", "foxglove_port": 0, "foxglove_control": "true"}
+        serve = {"foxglove": "true", "foxglove_port": 0, "foxglove_control": "true", "ground_altitude": -1e4}
         made.simulator = made.start("simulator", **serve, record="off")
         watch = {"foxglove": "true", "foxglove_port": 0, "components": "[simulator]", "record": "off"}
+        watch |= {"ground_altitude": -1e4}  # nobody holds them, and at the ground they would pause
         made.watched = other.start("simulator", **watch)
         made.port = port_of(made.simulator)
         yield made

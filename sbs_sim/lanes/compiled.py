@@ -536,6 +536,19 @@ for _test, _what in ((plain.any_lane, "any"), (plain.all_lanes, "all")):
         _reduced(_what),
     )
 
+
+def _seldom(context: Any, builder: Any, condition: Typed) -> Typed:
+    expect = builder.module.declare_intrinsic("llvm.expect", [BIT], ir.FunctionType(BIT, [BIT, BIT]))
+    return Typed(types.boolean, builder.call(expect, [condition.value, ir.Constant(BIT, 0)]))
+
+
+register(
+    (plain.seldom,),
+    [(types.Boolean,)],
+    lambda flag: types.boolean if isinstance(flag, types.Boolean) else None,
+    _seldom,
+)
+
 # --- vectors ----------------------------------------------------------------------------------------------------
 
 

@@ -315,6 +315,11 @@ def any_lane(mask: Mask) -> bool:
     return bool(mask.values.any())
 
 
+def seldom(condition: bool) -> bool:
+    """Return a truth value that is expected to be false: the code for the other case is put out of the way."""
+    return condition
+
+
 def all_lanes(mask: Mask) -> bool:
     """Return True if all lanes are true."""
     return bool(mask.values.all())

@@ -19,6 +19,7 @@ from sbs_sim.lanes import (
     maximum,
     minimum,
     rounded,
+    seldom,
     select,
     sqrt,
     transposed,
@@ -108,7 +109,7 @@ def contact_load(ground, contacts, memory, flight):
     for i in range(contacts.shape[0]):
         memory.contact[0, i], memory.contact[1, i] = zeros_like(none), zeros_like(none)
     height = ground.depth - dot(ground.down, S.vector_at(memory.state, S.POSITION))
-    if not any_lane(height < ground.reach):
+    if not seldom(any_lane(height < ground.reach)):
         return ForceMoment(force, moment)
     for i in range(contacts.shape[0]):
         point = contacts[i]

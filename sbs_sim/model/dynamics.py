@@ -25,6 +25,7 @@ from sbs_sim.lanes import (
     cross,
     dot,
     rounded,
+    seldom,
     spread,
     sqrt,
     transposed,
@@ -280,11 +281,11 @@ def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
     flight = body_motion(aircraft, memory.state, wind)
     loads = set_known_loads(aircraft, memory, flight, swash, psi)
     if aircraft.switches[0].complete_coupling == 1:
-        if aircraft.switches[0].teetering == 1:
+        if seldom(aircraft.switches[0].teetering == 1):
             lock_coning(aircraft, memory)
         solve_coupled_body(aircraft, memory, flight, loads)
         solve_blades(aircraft, memory)
-        if aircraft.switches[0].teetering == 1:
+        if seldom(aircraft.switches[0].teetering == 1):
             hold_coning(aircraft, memory)
         if with_loads:
             set_hub_loads(aircraft, memory)
@@ -299,18 +300,18 @@ def evaluate(aircraft, memory, swash, psi, wind, dx, with_loads):
 def set_known_loads(aircraft, memory, flight, swash, psi):
     """Set what is known before the accelerations are, of blades and hubs; the loads on the rigid part."""
     commands = swash
-    if aircraft.switches[0].scheduled == 1:
+    if seldom(aircraft.switches[0].scheduled == 1):
         set_commands(aircraft, memory, flight, swash)
         commands = memory.commands
     set_hub_velocities(aircraft, memory, flight)
     first = memory.state.shape[0] - 1 - memory.separation_states.shape[0]
     for i in range(memory.separation_states.shape[0]):
         memory.separation_states[i] = memory.state[first + i]
-    if aircraft.switches[0].wash == 1:
+    if seldom(aircraft.switches[0].wash == 1):
         set_wash(aircraft, memory)
-        if aircraft.switches[0].ground_effect > 0:
+        if seldom(aircraft.switches[0].ground_effect > 0):
             add_ground_wash(aircraft, memory, flight)
-        if aircraft.switches[0].ring == 1:
+        if seldom(aircraft.switches[0].ring == 1):
             add_ring(aircraft, memory)
     set_blade_terms(aircraft, memory, flight, commands, psi)
     sum_blades(aircraft, memory)
@@ -320,7 +321,7 @@ def set_known_loads(aircraft, memory, flight, swash, psi):
 @kernel
 def solve_coupled_body(aircraft, memory, flight, loads):
     """Set specific force and angular acceleration of the body or of a stand, all blades eliminated (`complete`)."""
-    if aircraft.switches[0].stand == 1:
+    if seldom(aircraft.switches[0].stand == 1):
         solve_on_stand(aircraft, memory, flight, loads)
     else:
         solve_with_blades(aircraft, memory, loads)
@@ -330,9 +331,9 @@ def solve_coupled_body(aircraft, memory, flight, loads):
 def set_rates(aircraft, memory, flight, dx):
     """Set the rates of body and rotors from the accelerations."""
     set_body_rates(memory, flight, dx)
-    if aircraft.switches[0].stand == 1:
+    if seldom(aircraft.switches[0].stand == 1):
         hold_locked_axes(aircraft, dx)
-    if aircraft.switches[0].contact == 1:
+    if seldom(aircraft.switches[0].contact == 1):
         set_contact_rates(aircraft.contacts, memory.contact, dx)
     set_rotor_rates(aircraft, memory, dx)
     first = memory.state.shape[0] - 1 - memory.separation_states.shape[0]
@@ -401,38 +402,38 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
         motion = blade_motion(blade, basis, pose, hub.omega)
         induced, gradient = induced_velocity(aircraft, memory, blade, pose)
         air_velocity = hub.air_velocity
-        if in_space(flight.air):
+        if seldom(in_space(flight.air)):
             air_velocity = air_velocity - gust_of_blade(aircraft, flight.air, blade, AT_HUB)
-        if aircraft.switches[0].ducts == 1:
+        if seldom(aircraft.switches[0].ducts == 1):
             air_velocity = sheltered(blade.duct_turning, air_velocity)
         flow = section_flow(blade, basis, motion, air_velocity, induced, gradient)
         sampled, over_disc = in_elements(memory), flow
-        if in_space(flight.air):
+        if seldom(in_space(flight.air)):
             over_disc = with_gust_gradients(aircraft, flight.air, blade, basis, flow)
             if not sampled:
                 flow = over_disc
         pitch = blade_pitch(aircraft, blade, pose, swash)
-        if aircraft.switches[0].unsteady_airfoil == 1:
+        if seldom(aircraft.switches[0].unsteady_airfoil == 1):
             set_circulation(aircraft.indices, memory, blade, terms, pose, over_disc, pitch)
             flow = with_wake_gradient(blade, basis, flow, terms.wake_gradient)
         terms.u_t_hinge, terms.u_t_slope = flow.u_t_hinge, flow.u_t_slope
         terms.u_p_hinge, terms.u_p_slope = flow.u_p_hinge, flow.u_p_slope
         terms.pitch = pitch
         elements = aircraft.elements[blade.elements]
-        if aircraft.switches[0].offsets == 1:
+        if seldom(aircraft.switches[0].offsets == 1):
             turning = pitch_motion(aircraft, blade, pose, swash)
             turned = offset_flow(blade, basis, motion, turning.rate, air_velocity, induced, gradient)
             if in_space(flight.air) and not sampled:
                 turned = offset_with_gust_gradients(aircraft, flight.air, blade, basis, turned)
-            if aircraft.switches[0].unsteady_airfoil == 1:
+            if seldom(aircraft.switches[0].unsteady_airfoil == 1):
                 turned = offset_with_wake_gradient(blade, basis, turned, terms.wake_gradient)
             met = met_by_offsets(aircraft, memory, r, basis, turned, pitch)
             at_hub = to_blade(blade, basis, hub.centripetal)
             set_offset_equations(aircraft, memory, r, pose, basis, motion, met, at_hub, pitch, turning)
             continue
-        if sampled:
+        if seldom(sampled):
             along = span_flow(blade, basis, motion, air_velocity, induced, gradient)
-            if aircraft.switches[0].unsteady_airfoil == 1:
+            if seldom(aircraft.switches[0].unsteady_airfoil == 1):
                 along = span_with_wake_gradient(blade, basis, along, terms.wake_gradient)
             loads, terms.outward_force, _, _ = optional_loads(
                 *(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, along, pitch),
@@ -441,11 +442,11 @@ def set_blade_terms(aircraft, memory, flight, swash, psi):
                 separation_of(aircraft, memory, r),
                 element_gusts(memory, blade, basis, r),
             )
-        elif aircraft.switches[0].section_options > 0:
+        elif seldom(aircraft.switches[0].section_options > 0):
             along = span_flow(blade, basis, motion, air_velocity, induced, gradient)
-            if in_space(flight.air):
+            if seldom(in_space(flight.air)):
                 along = span_with_gust_gradients(aircraft, flight.air, blade, basis, along)
-            if aircraft.switches[0].unsteady_airfoil == 1:
+            if seldom(aircraft.switches[0].unsteady_airfoil == 1):
                 along = span_with_wake_gradient(blade, basis, along, terms.wake_gradient)
             loads, terms.outward_force, _, _ = optional_loads(
                 *(air, blade, elements, aircraft.knots[r], aircraft.table, memory.strip, flow, along, pitch),
@@ -482,7 +483,7 @@ def set_wash(aircraft, memory):
     for j in range(aircraft.rotors.shape[0]):
         for row in range(WASH_ROWS):
             memory.wash[row, j] = zeros_like(aircraft.rotors[j].radius)
-    if aircraft.switches[0].interference == 1:
+    if seldom(aircraft.switches[0].interference == 1):
         add_interference(aircraft, memory)
 
 
@@ -492,7 +493,7 @@ def induced_velocity(aircraft, memory, blade, pose):
     inflow, quad, x = aircraft.indices.inflow, blade.quad, memory.state
     lambda0 = spread(x, inflow[S.UNIFORM], quad, blade)
     lambdas, lambdac = spread(x, inflow[S.SINE], quad, blade), spread(x, inflow[S.COSINE], quad, blade)
-    if aircraft.switches[0].wash == 1:
+    if seldom(aircraft.switches[0].wash == 1):
         wash = wash_of_blade(aircraft, memory, blade)
         lambda0, lambdas, lambdac = lambda0 + wash.uniform, lambdas + wash.sine, lambdac + wash.cosine
     return velocity_of_inflow(blade, pose, Inflow(lambda0, lambdac, lambdas))
@@ -597,9 +598,9 @@ def set_offset_equations(aircraft, memory, r, pose, basis, motion, air_loads, at
         found.moments[1] - blade.lag_spring * (pose.xi - blade.lag_rest) - blade.lag_damping * pose.xi_rate,
         inverse_where(blade.lead_lag, found.lag_inertia),
     )
-    if aircraft.switches[0].axial_dampers == 1:
+    if seldom(aircraft.switches[0].axial_dampers == 1):
         moments = with_axial_damper(blade, basis, pose, moments, pitch, turning.rate)
-    if aircraft.switches[0].lag_stops == 1:
+    if seldom(aircraft.switches[0].lag_stops == 1):
         moments = with_lag_stops(blade, pose, moments)
     inverse_lag_inertia = moments.inverse_lag_inertia
     share = rounded(found.flap_lag * inverse_lag_inertia)
@@ -632,22 +633,22 @@ def set_equations(aircraft, memory, r, pose, basis, motion, loads, at_hinges, at
     blade, terms = aircraft.blades[r], memory.terms[r]
     own = blade_accelerations(basis, motion)
     moments = hinge_moments(blade, basis, pose, loads, own.hinge + at_hinges, own.slope)
-    if aircraft.switches[0].axial_dampers == 1:
+    if seldom(aircraft.switches[0].axial_dampers == 1):
         moments = with_axial_damper(blade, basis, pose, moments, pitch, pitch_rate(aircraft, blade, pose, swash))
-    if aircraft.switches[0].lag_stops == 1:
+    if seldom(aircraft.switches[0].lag_stops == 1):
         moments = with_lag_stops(blade, pose, moments)
     flap, lag = hinge_columns(blade, basis)
     flap, lag = about_cg(blade, basis, flap), about_cg(blade, basis, lag)
     on_hub = known_loads(blade, basis, loads, own.hinge + at_hub, own.slope)
-    if aircraft.switches[0].section_options > 0:
+    if seldom(aircraft.switches[0].section_options > 0):
         on_hub = with_outward_force(basis, on_hub, terms.outward_force)
     known = about_cg(blade, basis, on_hub)
     inverse_lag_inertia = blade.lead_lag * moments.inverse_lag_inertia
     set_terms(terms, pose, moments, flap, lag, known, inverse_lag_inertia)
-    if aircraft.switches[0].complete_hub_moment == 0:
+    if seldom(aircraft.switches[0].complete_hub_moment == 0):
         terms.paper_moment, terms.flap_axis = paper_moment(blade, basis, pose, loads)
     thrust = rounded(basis.cos_flap * loads.normal_force)
-    if aircraft.switches[0].section_options > 0:
+    if seldom(aircraft.switches[0].section_options > 0):
         thrust = thrust + basis.span.z * terms.outward_force
     root_moment = blade.hinge_offset * loads.normal_force + loads.normal_moment  # Int (e_0 + s) dF_n
     inertia, inverse = locked_inertia(blade, basis), blade.inverse_second_moment
@@ -749,7 +750,7 @@ def set_hub_velocities(aircraft, memory, flight):
     """Set the velocity of every hub relative to the air, hub axes."""
     for j in range(aircraft.rotors.shape[0]):
         memory.flow[j].velocity = hub_motion(aircraft.rotors[j], flight).air_velocity
-        if in_space(flight.air):
+        if seldom(in_space(flight.air)):
             memory.flow[j].velocity = memory.flow[j].velocity - gust_of_rotor(flight.air, j)
 
 
@@ -769,7 +770,7 @@ def body_loads(aircraft, memory, flight, swash):
     for i in range(aircraft.fuselages.shape[0]):
         load = load_of_fuselage(aircraft, memory, flight, i)
         force, moment = force + load.force, moment + load.moment
-    if aircraft.switches[0].contact == 1:
+    if seldom(aircraft.switches[0].contact == 1):
         ground = contact_load(aircraft.ground[0], aircraft.contacts, memory, flight)
         force, moment = force + ground.force, moment + ground.moment
     return ForceMoment(force, moment)
@@ -780,7 +781,7 @@ def load_of_surface(aircraft, memory, flight, swash, i):
     """Load of the air on a lifting surface about the c.g., body axes."""
     surface, ramps = aircraft.surfaces[i], aircraft.ramps[i]
     wash = wash_at(aircraft, memory, surface, ramps)
-    if in_space(flight.air):
+    if seldom(in_space(flight.air)):
         wash = wash - gust_of_part(aircraft, flight.air, i)
     density, velocity = aircraft.air[0].density, flight.air_velocity
     return surface_load(density, surface, ramps, aircraft.shapes, swash, velocity, flight.omega, wash)
@@ -792,7 +793,7 @@ def load_of_fuselage(aircraft, memory, flight, i):
     number = aircraft.surfaces.shape[0] + i
     fuselage, ramps = aircraft.fuselages[i], aircraft.ramps[number]
     wash = wash_at(aircraft, memory, fuselage, ramps)
-    if in_space(flight.air):
+    if seldom(in_space(flight.air)):
         wash = wash - gust_of_part(aircraft, flight.air, number)
     return fuselage_load(aircraft.air[0].density, fuselage, aircraft.shapes, flight.air_velocity, flight.omega, wash)
 
@@ -1058,12 +1059,12 @@ def set_hub_loads(aircraft, memory):
         moment = moment - cross(rotor.hub, force)
         down = shaft_down(rotor.axes)
         axial = dot(down, moment)
-        if switches.complete_hub_moment == 0:  # across the shaft the paper's reading (theory.md section 9)
+        if seldom(switches.complete_hub_moment == 0):  # across the shaft the paper's reading (theory.md section 9)
             moment = down * axial + paper
             axial = dot(down, moment)
         loads.thrust, loads.torque = total.thrust, rotor.sense * axial
         loads.force, loads.moment = force, moment
-        if switches.offsets == 1:
+        if seldom(switches.offsets == 1):
             for quad in range(rotor.first_quad, rotor.first_quad + rotor.quads):
                 loads.torque = loads.torque - memory.hubs[quad].pitch_power
 
@@ -1077,11 +1078,11 @@ def sum_hub_loads(aircraft, memory):
         force = terms.known_force - terms.flap_column_force * flap - terms.lag_column_force * lag
         moment = terms.known_moment - terms.flap_column_moment * flap - terms.lag_column_moment * lag
         add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "force", (force, moment))
-        if aircraft.switches[0].complete_hub_moment == 0:
+        if seldom(aircraft.switches[0].complete_hub_moment == 0):
             inertial = blade.lead_lag * blade.hub_second_moment * flap
             paper = terms.paper_moment - terms.flap_axis * inertial
             add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "paper_moment", (paper,))
-        if aircraft.switches[0].offsets == 1:
+        if seldom(aircraft.switches[0].offsets == 1):
             power = pitch_power(memory, r)
             add_to_quads(memory.hubs, blade.quad, blade.starts_quad, "pitch_power", (power,))
 
@@ -1148,7 +1149,7 @@ def set_body_rates(memory, flight, dx):
 def set_rotor_rates(aircraft, memory, dx):
     """Set the rates of the multiblade coordinates (paper eqs. [13], [14]) and of the inflow."""
     x, lead_lag = memory.state, aircraft.switches[0].lead_lag
-    if aircraft.switches[0].offsets == 1:
+    if seldom(aircraft.switches[0].offsets == 1):
         add_lag_of_flap(aircraft, memory, -1.0)
     for r in range(aircraft.blades.shape[0]):
         add_accelerations(aircraft.blades[r], memory.terms[r], memory.means, memory.harmonics)
@@ -1160,7 +1161,7 @@ def set_rotor_rates(aircraft, memory, dx):
         add_rotation_terms(rotor, x, dx, rotor.flap, rotor.flap_rate, 1.0)
         add_rotation_terms(rotor, x, dx, rotor.lag, rotor.lag_rate, 1.0 * lead_lag)
         set_inflow_rates(aircraft, memory, j, dx)
-    if aircraft.switches[0].unsteady_airfoil == 1:
+    if seldom(aircraft.switches[0].unsteady_airfoil == 1):
         set_circulation_rates(aircraft, memory, dx)
 
 
@@ -1169,10 +1170,10 @@ def flow_of_disc(aircraft, memory, j):
     """Flow through a disc; the wash of other rotors is part of the air that comes to it."""
     rotor, uniform = aircraft.rotors[j], memory.state[aircraft.rotors[j].inflow + S.UNIFORM]
     mu = memory.flow[j].velocity * rotor.inverse_tip_speed
-    if aircraft.switches[0].wash == 1:
+    if seldom(aircraft.switches[0].wash == 1):
         met = sheltered(rotor.duct_turning, met_with_wash(memory, j, mu))
         flow = rotor_flow(rotor, uniform, met)
-    elif aircraft.switches[0].ducts == 1:
+    elif seldom(aircraft.switches[0].ducts == 1):
         flow = rotor_flow(rotor, uniform, sheltered(rotor.duct_turning, mu))
     else:
         flow = rotor_flow(rotor, uniform, mu)
@@ -1184,7 +1185,7 @@ def flow_of_duct(aircraft, memory, j):
     """Thrusts of a rotor and of its duct; the wash of other rotors is part of the air that comes to them."""
     rotor, uniform = aircraft.rotors[j], memory.state[aircraft.rotors[j].inflow + S.UNIFORM]
     mu = memory.flow[j].velocity * rotor.inverse_tip_speed
-    if aircraft.switches[0].wash == 1:
+    if seldom(aircraft.switches[0].wash == 1):
         flow = duct_flow(rotor, uniform, met_with_wash(memory, j, mu))
     else:
         flow = duct_flow(rotor, uniform, mu)
@@ -1222,7 +1223,7 @@ def rates_of_inflow(aircraft, memory, j, loads):
     rotor, x = aircraft.rotors[j], memory.state
     states = Inflow(x[rotor.inflow + S.UNIFORM], x[rotor.inflow + S.COSINE], x[rotor.inflow + S.SINE])
     flow = flow_of_disc(aircraft, memory, j)
-    if aircraft.switches[0].ring == 1:  # the mean inflow is that of the mean thrust
+    if seldom(aircraft.switches[0].ring == 1):  # the mean inflow is that of the mean thrust
         loads = Inflow(loads.uniform + memory.ring[LOAD, j], loads.cosine, loads.sine)
     rates = inflow_rates(rotor, states, flow, loads, aircraft.switches[0].cyclic_inflow)
     uniform = rounded(rates.uniform)

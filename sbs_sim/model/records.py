@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.lanes.bundles import bundled
 from sbs_sim.model.state import BODY_SIZE, CONTACT_STATES, ROW, UNSEEN_NAMES, WAKE_NAMES
 
 Array = NDArray[np.float64]
@@ -385,6 +386,7 @@ def records(fields: dict[str, Any], shape: Any, n: int) -> NDArray[Any]:
     return aligned(shape, dtype_of(fields, n))
 
 
+@bundled
 class StateIndices(NamedTuple):
     """Indices of the values of the rotor that each quad belongs to, for `sbs_sim.lanes.spread`.
 
@@ -417,6 +419,7 @@ class StateIndices(NamedTuple):
     gust: IntArray
 
 
+@bundled
 class Model(NamedTuple):
     """Aircraft of one structure, as many as there are lanes.
 
@@ -478,6 +481,7 @@ class Model(NamedTuple):
     influences: Array
 
 
+@bundled
 class Work(NamedTuple):
     """Memory of a derivative.
 
@@ -649,6 +653,7 @@ def _copied(array: NDArray[Any]) -> NDArray[Any]:
     return made
 
 
+@bundled
 class Exponential(NamedTuple):
     """Coefficients and memory of the exponential method, in blocks of coupled states.
 
@@ -741,6 +746,7 @@ def _by_registers(coefficients: Sequence[Sequence[Array]], each: int) -> Array:
     return made
 
 
+@bundled
 class Space(NamedTuple):
     """Air that is not the same everywhere, see `sbs_sim.model.air`; of air that is, all is empty.
 
@@ -783,6 +789,7 @@ def no_space(n: int) -> Space:
     return Space(nothing, none.reshape(0, 1, 1, 4), none, nothing, none, elements, flights, nothing, nothing)
 
 
+@bundled
 class Tick(NamedTuple):
     """Memory of a tick.
 

@@ -8,7 +8,7 @@ Helicopter Theory, section 5-12.
 import math
 from typing import Any, NamedTuple
 
-from sbs_sim.lanes import Vector, any_lane, cross, dot, minimum, rounded, select, sqrt, table_row, zeros_like
+from sbs_sim.lanes import Vector, any_lane, cross, dot, minimum, rounded, seldom, select, sqrt, table_row, zeros_like
 from sbs_sim.model.blade import to_blade
 from sbs_sim.model.element_gusts import free_gust_at, gust_at
 from sbs_sim.model.kernel import kernel
@@ -90,7 +90,7 @@ def mean_factor(outer, ratio, series):
     Near the tip by the angle whose cosine and sine are those of the sum. Where both decays are small, which is nearly
     everywhere, by the series: what it leaves out is below the last bit.
     """
-    if any_lane(outer > NEAR_TIP):
+    if seldom(any_lane(outer > NEAR_TIP)):
         inner = outer * ratio + 0.0
         if any_lane(outer > SINE_EIGHTH):
             outer_sine, inner_sine = sqrt((1.0 - outer) * (1.0 + outer)), sqrt((1.0 - inner) * (1.0 + inner))
@@ -191,7 +191,7 @@ def optional_loads(air, blade, elements, knots, table, strip, flow, along, pitch
             given = given + dot(load, gust_at(gusts, i))
             given_free = given_free + dot(load, free_gust_at(gusts, i))
     loads = AirLoads(normal_force, forward_force, normal_moment, forward_moment)
-    if switches.late_stall == 1:
+    if seldom(switches.late_stall == 1):
         late = late_loads(air, blade, elements, table, strip, flow, pitch, separation, gusts)
         added = late.loads
         loads = AirLoads(

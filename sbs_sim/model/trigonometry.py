@@ -6,7 +6,7 @@ reason.
 
 import math
 
-from sbs_sim.lanes import any_lane, floor, inverse_root_guess, maximum, minimum, rounded, select, with_sign
+from sbs_sim.lanes import any_lane, floor, inverse_root_guess, maximum, minimum, rounded, seldom, select, with_sign
 from sbs_sim.model.kernel import kernel
 
 # Of z, z^3, z^5 ... of the arcsine for |z| <= sin 22.5 deg: minimax relative error 1.2e-16
@@ -61,7 +61,7 @@ def angle_of(y, x, inverse_length):
 
     Where all points are within 22.5 deg of the axis that is quick, and gives the same bits.
     """
-    if any_lane(abs(y) > TANGENT_EIGHTH * x):
+    if seldom(any_lane(abs(y) > TANGENT_EIGHTH * x)):
         return _any_angle(y, x, inverse_length)
     return small_arcsine(y * inverse_length)
 

@@ -31,6 +31,7 @@ from sbs_sim.lanes import (
     memory,
     minimum,
     rounded,
+    seldom,
     select,
     sqrt,
     transposed,
@@ -277,15 +278,18 @@ def test_the_fused_operation_of_the_interpreter_is_that_of_the_processor():
 
 def test_any_and_all_lanes():
     def count(a, b):
-        return zeros_like(a) + (1.0 if any_lane(a < b) else 0.0) + (2.0 if all_lanes(a < b) else 0.0)
+        found = zeros_like(a) + (1.0 if any_lane(a < b) else 0.0) + (2.0 if all_lanes(a < b) else 0.0)
+        if seldom(any_lane(a < b)):
+            return found + (4.0 if seldom(all_lanes(a < b)) else 8.0)
+        return found
 
     for n in WIDTHS[1:]:
         data = np.ones((3, 2, n))
         data[0, 0], data[1, 0, -1] = 0.0, 0.0
         result = np.empty((3, n))
         compiled(count, 2)(data, result, LIKE[n])
-        np.testing.assert_array_equal(result[:, 0], [3.0, 1.0, 0.0])
-        assert [count(*map(Lanes, row)).values[0] for row in data] == [3.0, 1.0, 0.0]
+        np.testing.assert_array_equal(result[:, 0], [7.0, 9.0, 0.0])
+        assert [count(*map(Lanes, row)).values[0] for row in data] == [7.0, 9.0, 0.0]
     with pytest.raises(TypeError, match="any_lane or all_lanes"):
         bool(Mask([True, False]))
 

@@ -283,9 +283,13 @@ def _late_stall(data: dict[str, Any], rng: np.random.Generator) -> None:
     """Separation that follows the flow late, where no blade has offsets, which goes without it."""
     if any(rotor.has_offsets for rotor in Aircraft.from_dict(data).rotors):
         return
-    for rotor in data["rotors"]:
+    kinds, first = ["separation", "leishman_beddoes"], int(rng.integers(2))
+    for i, rotor in enumerate(data["rotors"]):
         if rng.random() < 0.3:
-            rotor["dynamic_stall"] = str(rng.choice(["separation", "leishman_beddoes"]))
+            rotor["dynamic_stall"] = kinds[(first + i) % 2]
+        if rotor.get("dynamic_stall") == "leishman_beddoes":
+            times = {"pressure": (1.0, 4.0), "separation": (2.0, 10.0), "vortex": (4.0, 15.0), "passage": (5.0, 15.0)}
+            rotor["stall_lags"] = {name: float(rng.uniform(*ends)) for name, ends in times.items()}
 
 
 def _distribute_mass(rotor: dict[str, Any], rng: np.random.Generator) -> None:

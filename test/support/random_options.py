@@ -285,7 +285,7 @@ def _late_stall(data: dict[str, Any], rng: np.random.Generator) -> None:
         return
     kinds, first = ["separation", "leishman_beddoes"], int(rng.integers(2))
     for i, rotor in enumerate(data["rotors"]):
-        if rng.random() < 0.3:
+        if rng.random() < 0.7:
             rotor["dynamic_stall"] = kinds[(first + i) % 2]
         if rotor.get("dynamic_stall") == "leishman_beddoes":
             times = {"pressure": (1.0, 4.0), "separation": (2.0, 10.0), "vortex": (4.0, 15.0), "passage": (5.0, 15.0)}

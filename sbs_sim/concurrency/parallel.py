@@ -1,5 +1,6 @@
 """Independent calls side by side: in threads on the cores of this machine, or on the workers of a dask cluster."""
 
+import itertools
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from sbs_sim.aircraft import Aircraft
 
 MAX_WORKERS = 256
+_NUMBERS = itertools.count()  # of the pools of this process
 POLL_PERIOD = 0.05  # s between looks whether the caller wants to go on
 
 
@@ -148,12 +150,16 @@ def _pool(workers: int, dask: "str | distributed.Client | None") -> AbstractCont
 
 @contextmanager
 def _threads(workers: int) -> Iterator["Threads"]:
-    executor, stop = ThreadPoolExecutor(workers, thread_name_prefix="sbs_sim"), threading.Event()
+    name, stop = f"sbs_sim_{next(_NUMBERS)}", threading.Event()
+    executor = ThreadPoolExecutor(workers, thread_name_prefix=name)
     try:
         yield Threads(executor, stop)
     finally:
         stop.set()  # what is still at work then was interrupted
         executor.shutdown(cancel_futures=True)
+        for thread in threading.enumerate():  # one whose start was interrupted is unknown to the executor
+            if thread.name.startswith(f"{name}_"):
+                thread.join()
 
 
 class Threads:

@@ -113,6 +113,26 @@ def test_calls_at_work_end_where_they_look_and_those_that_wait_do_not_begin(sbs)
     assert sorted(started) == sorted(ended) == [0, 1]
 
 
+def test_a_thread_whose_start_is_interrupted_ends_too(sbs, monkeypatch):
+    """Ctrl-C while the executor waits for its second thread to start, of which it then knows nothing."""
+    start = threading.Thread.start
+
+    def interrupted(thread):
+        start(thread)
+        if thread.name.startswith("sbs_sim") and thread.name.endswith("_1"):
+            raise KeyboardInterrupt
+
+    def work(_):
+        while True:
+            interruption.look()
+            time.sleep(0.001)
+
+    monkeypatch.setattr(threading.Thread, "start", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        compute(work, [(sbs,)] * 5, lambda *_: None, Execution(), 2)
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("sbs_sim")]
+
+
 def test_an_error_of_the_caller_ends_the_flights_too(sbs, hover):
     def progress(*_):
         raise RuntimeError("of the caller")

@@ -32,16 +32,19 @@ class Bundle:
         values = zip(self._fields, self, strict=True)  # type: ignore[attr-defined, call-overload]
         return BundleType(type(self).__name__, tuple((name, _type_of(name, value)) for name, value in values))
 
-    @cached_property
-    def _table(self) -> NDArray[np.int64]:
-        """Address and shape of every array, one after the other."""
-        return np.array(list(_words(self)), dtype=np.int64)
-
-    @cached_property
+    @property
     def _address(self) -> int:
-        """Of the table, which must live as long as this is used."""
-        address: int = self._table.__array_interface__["data"][0]
-        return address
+        """Of the table of addresses and shapes, which lives as long as the bundle."""
+        kept: tuple[NDArray[np.int64], int] | None = self.__dict__.get("_kept")
+        if kept is None:
+            table = np.array(list(_words(self)), dtype=np.int64)
+            # of threads that come here together all take the first one's
+            kept = self.__dict__.setdefault("_kept", (table, table.__array_interface__["data"][0]))
+        return kept[1]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy, also one in another process, has its own table."""
+        return type(self), tuple(self)  # type: ignore[arg-type]
 
 
 def bundled(kind: type[Kind]) -> type[Kind]:

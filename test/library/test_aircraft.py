@@ -426,6 +426,7 @@ OPTIONAL = {
     "lag_damper",
     "lag_stop",
     "duct",
+    "stall_lags",
     "stations",
     "values",
     "tip_mass",
@@ -508,6 +509,10 @@ def test_every_key_of_the_schema_is_read_and_used(path, read_as_it_is):
     if path[2:3] == ("duct",):
         data["rotors"][0]["duct"] = {"exit_area": 0.9}
         aircraft, value = Aircraft.from_dict(data), 0.9
+        everything, arrays = flattened(aircraft), model_arrays(aircraft)
+    if path[2:3] == ("stall_lags",):
+        data["rotors"][0]["dynamic_stall"] = "leishman_beddoes"
+        aircraft, value = Aircraft.from_dict(data), 5.0
         everything, arrays = flattened(aircraft), model_arrays(aircraft)
     if path[-1] in ("stations", "values", "tip_mass"):
         values = ["linear_573", "naca0012"] * 2 if path[2] == "outboard_airfoils" else [0.05, 0.04, 0.03]

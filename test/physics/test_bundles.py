@@ -1,7 +1,9 @@
 """Bundles: what compiled code reads through one address is what the arrays hold, without a copy."""
 
+import copy
 import gc
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numba
@@ -100,6 +102,23 @@ def test_arrays_live_as_long_as_their_bundle():
         np.full((2, 3, 4), 7.0)
         looked(kept, out)
         assert out[1] == 24 + 100
+
+
+def test_copies_have_their_own_arrays():
+    outer, out = made(), np.zeros(5)
+    looked(outer, out)
+    for other in (copy.deepcopy(outer), pickle.loads(pickle.dumps(outer))):
+        other.rows[:] = 3.0
+        looked(other, out)
+        assert out[1] == 36 + 100
+    assert outer.rows[1, 2, 3] == 123.0
+    assert copy.copy(outer).rows is outer.rows
+
+
+def test_threads_take_one_table():
+    outer = made()
+    with ThreadPoolExecutor(8) as pool:
+        assert len(set(pool.map(lambda _: outer._address, range(64)))) == 1
 
 
 def test_it_is_a_named_tuple():

@@ -989,12 +989,12 @@ class Rotor(ByContent):
         return self.dynamic_stall == "leishman_beddoes"
 
     @property
-    def pressure_rate(self) -> float:
-        """Rate at which the pressure at the leading edge follows the flow in hover at most [1/s]."""
+    def stall_rate(self) -> float:
+        """Rate of the quickest state of a section in hover [1/s], of its pressure or its vortex; 0 without one."""
         stations = np.linspace(0.0, self.blade_length, 101)
         velocity = (self.hinge_offset + stations) * self.speed
         fastest = float((2.0 * velocity / self.chord_at(stations / self.blade_length)).max())
-        return fastest / self.pressure_lag if self.has_stall_vortex else 0.0
+        return fastest / min(self.pressure_lag, self.vortex_lag) if self.has_stall_vortex else 0.0
 
     @property
     def stall_lags(self) -> tuple[float, ...]:

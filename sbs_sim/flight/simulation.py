@@ -50,7 +50,7 @@ AZIMUTH_STEPS = (math.radians(0.01), math.radians(45.0))  # rad
 AZIMUTH_STEP_DEG = 14.4  # by default: docs/speed.md has its errors
 AZIMUTH_STEP = math.radians(AZIMUTH_STEP_DEG)
 
-STALL_STEPS = 0.6  # steps in the time of a pressure lag in hover: half again the airspeed is stable by every method
+STALL_STEPS = 0.6  # steps in the shortest lag of stall in hover: half again the airspeed is stable by every method
 # A tick is one uninterrupted call of compiled code; this many steps take it a tenth of a second.
 MAX_STEPS_PER_TICK = 10_000
 MAX_WIND_TICKS = 1_000_000_000  # that turbulence is brought forward by for a log that begins in mid-flight: minutes
@@ -138,7 +138,7 @@ class Simulation:
         self.tick = tick
         fastest = max(rotor.speed for rotor in aircraft.rotors)
         # the margin keeps a step that is right but for rounding from being cut once more
-        rates = [fastest / azimuth_step, *(STALL_STEPS * rotor.pressure_rate for rotor in aircraft.rotors)]
+        rates = [fastest / azimuth_step, *(STALL_STEPS * rotor.stall_rate for rotor in aircraft.rotors)]
         self.steps_per_tick = max(1, math.ceil(max(rates) * tick * (1 - 1e-12)))
         if self.steps_per_tick > MAX_STEPS_PER_TICK:
             raise SimulationError(

@@ -315,9 +315,11 @@ def test_the_lag_of_the_pressure_sets_the_steps():
     sbs = Aircraft.load("sbs")
     late = sbs.with_value("rotors.dynamic_stall", "leishman_beddoes")
     flights = [Simulation(one, trimmed_state(one, trim(one)), trim(one).swashplate) for one in (sbs, late)]
-    rate = late.rotors[0].pressure_rate
+    rate = late.rotors[0].stall_rate
     assert rate == pytest.approx(2 * late.rotors[0].speed * 0.505 / (1.7 * late.rotors[0].chord_at(1.0)), rel=0.05)
     assert 1.5 * rate * flights[0].step_size > 2.785 > 1.5 * rate * flights[1].step_size
+    quick = late.with_values({"rotors.stall_lags.vortex": 0.5})
+    assert quick.rotors[0].stall_rate == pytest.approx(rate * 1.7 / 0.5), "then of the vortex"
     slow = Simulation(late, trimmed_state(late, trim(late)), trim(late).swashplate, azimuth_step=np.radians(1.0))
     assert slow.step_size < flights[1].step_size
 

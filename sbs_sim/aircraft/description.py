@@ -991,10 +991,12 @@ class Rotor(ByContent):
     @property
     def stall_rate(self) -> float:
         """Rate of the quickest state of a section in hover [1/s], of its pressure or its vortex; 0 without one."""
+        if not self.has_stall_vortex:
+            return 0.0
         stations = np.linspace(0.0, self.blade_length, 101)
         velocity = (self.hinge_offset + stations) * self.speed
         fastest = float((2.0 * velocity / self.chord_at(stations / self.blade_length)).max())
-        return fastest / min(self.pressure_lag, self.vortex_lag) if self.has_stall_vortex else 0.0
+        return fastest / min(self.pressure_lag, self.vortex_lag)
 
     @property
     def stall_lags(self) -> tuple[float, ...]:

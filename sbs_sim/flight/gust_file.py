@@ -8,12 +8,11 @@ import numpy as np
 
 from sbs_sim import checks
 from sbs_sim.errors import SimulationError
-from sbs_sim.model.gust_table import DISTANCE, MAX_GUST, TIME, GustTable
+from sbs_sim.model.gust_table import DISTANCE, MAX_GUST, MAX_POSITION, TIME, GustTable
 
 VELOCITIES = ["north [m/s]", "east [m/s]", "down [m/s]"]
 HEADS = {"time [s]": TIME, "distance [m]": DISTANCE}
 MAX_SIZE = 2_000_000  # bytes of a file
-MAX_POSITION = 1e6  # s or m, as in `GustTable`
 
 
 def read_gust(path: str | Path) -> GustTable:

@@ -85,21 +85,24 @@ def with_steady_separation(aircraft: Aircraft, state: Array, swashplate: Array, 
         return state
     engine, layout, found = Engine(aircraft.arranged(True, True, "blades")), aircraft.layout, state.copy()
     given = [engine.lanes([np.ravel(swashplate)]), engine.memory(len(aircraft.rotors))]
-    air, out, rates = engine.lanes([np.asarray(wind, dtype=float)]), engine.memory(len(state)), []
+    air, out = engine.lanes([np.asarray(wind, dtype=float)]), engine.memory(len(state))
+
+    def rates() -> Array:
+        engine.derivative(engine.model, engine.lanes([found]), *given, air, engine.work, out, False)
+        return out[:, 0].copy()
+
+    ends = []
     for value in (0.0, 1.0):
         found[layout.sections_start :] = value
-        engine.derivative(engine.model, engine.lanes([found]), *given, air, engine.work, out, False)
-        rates.append(out[:, 0].copy())
-    slope = rates[0] - rates[1]
-    settled = np.where(slope > 0.0, rates[0] / np.where(slope > 0.0, slope, 1.0), 1.0)
+        ends.append(rates())
+    slope = ends[0] - ends[1]
+    settled = np.where(slope > 0.0, ends[0] / np.where(slope > 0.0, slope, 1.0), 1.0)
     found[layout.sections_start :] = 0.0
     for name in ("attached_share", "pressure_lift"):
         found[layout.section(name)] = settled[layout.section(name)]
     if layout.section_states > 1:
-        ages = layout.section("vortex_age")
-        engine.derivative(engine.model, engine.lanes([found]), *given, air, engine.work, out, False)
-        long = max(rotor.vortex_passage for rotor in aircraft.rotors)
-        found[ages] = np.where(out[ages, 0] > 0.0, long, 0.0)
+        ages, long = layout.section("vortex_age"), max(rotor.vortex_passage for rotor in aircraft.rotors)
+        found[ages] = np.where(rates()[ages] > 0.0, long, 0.0)
     return found
 
 

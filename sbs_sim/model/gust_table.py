@@ -16,6 +16,7 @@ from sbs_sim.errors import SimulationError
 Array = NDArray[np.float64]
 
 MAX_GUST = 100.0  # m/s
+MAX_POSITION = 1e6  # s or m
 MAX_ROWS = 10_000
 TIME, DISTANCE = "time", "distance"
 UNITS = {TIME: "s", DISTANCE: "m"}
@@ -56,10 +57,11 @@ class GustTable(ByContent):
             allowed = f"({len(positions)}, 3), north, east, down at each position"
             raise SimulationError(f"own_gust.velocities has shape {velocities.shape}: allowed is {allowed}")
         for i, position in enumerate(positions.tolist()):
-            checks.number(f"own_gust.positions[{i}]", position, -1e6, 1e6, UNITS[self.over], SimulationError)
+            name = f"own_gust.positions[{i}]"
+            checks.number(name, position, -MAX_POSITION, MAX_POSITION, UNITS[self.over], SimulationError)
             if i and not position > positions[i - 1]:
                 raise SimulationError(
-                    f"own_gust.positions[{i}] = {position:g}: allowed is more than {positions[i - 1]:g}, the one before"
+                    f"{name} = {position:g}: allowed is more than {positions[i - 1]:g}, the one before"
                 )
         wrong = np.argwhere(~(np.abs(velocities) <= MAX_GUST))
         if len(wrong):

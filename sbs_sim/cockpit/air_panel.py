@@ -11,6 +11,7 @@ from viser import ViserServer
 from sbs_sim.errors import SimulationError
 from sbs_sim.flight.gust_file import MAX_SIZE, gust_table
 from sbs_sim.flight.gust_standards import WIND_AT_20_FT, specified_turbulence
+from sbs_sim.model.gust_table import TIME, GustTable
 from sbs_sim.model.wind import CHOICES
 
 Array = NDArray[np.float64]
@@ -40,6 +41,7 @@ class AirPanel:
 
     def __init__(self, server: ViserServer, ask: Callable[[], None], refuse: Callable[[str], None]) -> None:
         self._gui, self._refuse, self._own = server.gui, refuse, ""
+        self._table: GustTable | None = None
         with self._gui.add_folder(FOLDER, expand_by_default=False):
             self._wind = self._vector(100.0)
             self._profile = self._gui.add_dropdown("Profile", CHOICES["wind_profile"], hint="over the height")
@@ -48,6 +50,7 @@ class AirPanel:
             self._gui.add_button("Set wind").on_click(lambda _: ask())
         self._known: dict[int, Any] = {}  # values that were asked for or shown last, by the identities of fields
         self._take_as_known()
+        self._show_what_acts()
 
     def _vector(self, most: float) -> list[Any]:
         return [self._gui.add_number(f"{name} [m/s]", 0.0, min=-most, max=most, step=0.5) for name in AXES]
@@ -61,12 +64,14 @@ class AirPanel:
         )
         self._extent = gui.add_dropdown("Extent", CHOICES["turbulence_extent"], hint=hint)
         self._specified = gui.add_dropdown("Intensity", tuple(SPECIFIED))
-        self._height = gui.add_number("Height [m]", 30.0, min=0.0, max=20_000.0, step=1.0, hint="of MIL-F-8785C")
+        self._specified.on_update(lambda _: self._show_what_acts())
+        self._height = gui.add_number("At height [m]", 30.0, min=0.0, max=20_000.0, step=1.0, hint="of MIL-F-8785C")
 
     def _add_gusts(self) -> None:
         gui = self._gui
         with gui.add_folder("Gust", expand_by_default=False):
             self._shape = gui.add_dropdown("Shape", (NO_GUST, OVER_TIME, *SHAPES))
+            self._shape.on_update(lambda _: self._show_what_acts())
             self._gust = [
                 gui.add_number(f"Gust {name.lower()} [m/s]", 0.0, min=-100.0, max=100.0, step=0.5) for name in AXES
             ]
@@ -76,7 +81,7 @@ class AirPanel:
             file.on_upload(lambda event: self.take_file(event.target.value.name, event.target.value.content))
             self._file = gui.add_html("", visible=False)
             self._remove = gui.add_button("Remove the file", visible=False)
-            self._remove.on_click(lambda _: self._keep("", ""))
+            self._remove.on_click(lambda _: self._keep("", None))
 
     def take_file(self, name: str, content: bytes) -> None:
         """Take over a file of a user, or say why it is no gust."""
@@ -90,12 +95,21 @@ class AirPanel:
         except SimulationError as error:
             self._refuse(str(error))
         else:
-            self._keep(text, f"own gust: {len(table.positions)} rows over {table.over}")
+            self._keep(text, table)
 
-    def _keep(self, text: str, shown: str) -> None:
-        self._own = text
-        self._file.content = escape(shown)
-        self._file.visible = self._remove.visible = bool(text)
+    def _keep(self, text: str, table: GustTable | None) -> None:
+        self._own, self._table = text, table
+        self._file.content = escape(f"own gust: {len(table.positions)} rows over {table.over}") if table else ""
+        self._show_what_acts()
+
+    def _show_what_acts(self) -> None:
+        """Hide the fields that what is chosen makes idle."""
+        specified, shaped = self._specified.value != OWN_SIGMA, self._shape.value != NO_GUST
+        self._turbulence.visible, self._height.visible = not specified, specified
+        for field in (*self._gust, self._length):
+            field.visible = shaped
+        self._file.visible = self._remove.visible = self._table is not None
+        self._begin.visible = shaped or self._table is not None
 
     def _take_as_known(self) -> None:
         following = (*self._wind, self._turbulence, self._specified, self._spectrum, self._extent, self._profile)
@@ -127,6 +141,8 @@ class AirPanel:
         severity = SPECIFIED.get(self._specified.value)
         if severity is not None:
             found |= specified_turbulence(float(self._height.value), severity, model=self._spectrum.value)
+        if self._table is not None:
+            found["gust_delay" if self._table.over == TIME else "gust_distance"] = float(self._begin.value)
         if self._shape.value != NO_GUST:
             found["gust"] = tuple(float(number.value) for number in self._gust)
             over_time = self._shape.value == OVER_TIME

@@ -787,6 +787,32 @@ def test_the_wind_that_blows_is_shown_but_where_somebody_sets_another():
         server.stop()
 
 
+def test_a_gust_from_a_file_begins_when_the_panel_says():
+    """It does with and without a shape beside it, and no field is shown that acts on nothing."""
+    server = viser.ViserServer(host="127.0.0.1", port=free_port(), verbose=False)
+    refused = []
+    try:
+        panel = AirPanel(server, ask=lambda: None, refuse=refused.append)
+        numbers = {one.label: one for one in vars(panel).values() if hasattr(one, "label")}
+        begin, length = numbers["Begins after [s or m]"], numbers["Length [s or m]"]
+        assert (begin.visible, length.visible) == (False, False)
+        begin.value = 4.0
+        assert not {"gust_delay", "gust_distance"} & panel.fields().keys()
+        for head, name in (("time [s]", "gust_delay"), ("distance [m]", "gust_distance")):
+            panel.take_file("own.csv", f"{head},north [m/s],east [m/s],down [m/s]\n0,0,0,0\n1,1,2,3\n".encode())
+            assert panel.fields()[name] == 4.0
+            assert (begin.visible, length.visible) == (True, False)
+        numbers["Shape"].value = "1-cosine over time"
+        assert panel.fields() | {"gust_delay": 4.0, "gust_distance": 4.0} == panel.fields()
+        assert length.visible
+        assert not refused
+        assert (numbers["Turbulence, σ [m/s]"].visible, numbers["At height [m]"].visible) == (True, False)
+        numbers["Intensity"].value = "MIL-F-8785C, light"
+        assert (numbers["Turbulence, σ [m/s]"].visible, numbers["At height [m]"].visible) == (False, True)
+    finally:
+        server.stop()
+
+
 # --- in a browser -----------------------------------------------------------------------------------------------
 
 

@@ -73,6 +73,11 @@ class Layout:
             message[offset : offset + len(constant)] == constant for offset, constant in self._marks
         )
 
+    @property
+    def size(self) -> int:
+        """Bytes up to the end of its last value; up to PADDING may follow."""
+        return self._offset
+
     @cached_property
     def doubles(self) -> dict[str, tuple[int, int]]:
         """Offset [bytes] and number of values of every float64 field, by name; least byte first alone."""

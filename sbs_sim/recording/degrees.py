@@ -1,7 +1,8 @@
 """Messages with their angles in degrees, for viewers that cannot convert them.
 
-Nothing else changes, so the bytes are those of the message, with other numbers in the fields of angles. Such a field
-has the unit rad, rad/s or rad/s^2 in its definition; its name gets the ending `_deg`, and the type that of `Deg`.
+The bytes are those of the message, with other numbers in the fields of angles. Such a field has the unit rad, rad/s or
+rad/s^2 in its definition; its name gets the ending `_deg`, and the type that of `Deg`. Behind a message with the
+quaternion `attitude` come its roll, pitch and heading as `attitude_deg`.
 """
 
 import math
@@ -10,10 +11,15 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from sbs_sim.errors import RecordingError
+from sbs_sim.model.frames import quaternion_to_euler
 from sbs_sim.recording.cdr import HEAD, Layout
 from sbs_sim.recording.definitions import PRIMITIVES, SEPARATOR, SEQUENCE, Definitions, Field, parse, parts, short_name
 
 UNITS = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2"}
+ATTITUDE, QUATERNION = "attitude", "geometry_msgs/Quaternion"
+EULER = "sbs_msgs/AttitudeDeg"
+EULER_ANGLES = ("roll", "pitch", "heading")  # [deg]; turned by heading, pitch, roll, in this order, NED becomes FRD
 _CONSTANT = re.compile(r"^\s*(\w+\s+\w+\s*=[^#\n]*)", re.MULTILINE)
 _INDEX = re.compile(r"\[\d+\]")
 
@@ -39,8 +45,11 @@ class Degrees:
         self._definitions = parse(type_name, definition)
         self._texts = dict(parts(type_name, definition))
         self.angles = frozenset(_angles(self._definitions, self._root, "", False))
+        fields = self._definitions.get(self._root, ())
+        self._has_attitude = any((field.name, field.type) == (ATTITUDE, QUATERNION) for field in fields)
         self._layout: Layout | None = None  # of the last message
         self._indices: NDArray[np.int64] = np.zeros(0, np.int64)
+        self._quaternion: list[int] = []  # indices of w, x, y, z
 
     @property
     def type_name(self) -> str:
@@ -56,6 +65,10 @@ class Degrees:
             head = [SEPARATOR, f"MSG: {name}"] if made else []
             fields = map(self._line, self._definitions[kind])
             made += [*head, *([text.rstrip("\n")] if name == kind else [*_CONSTANT.findall(text), *fields])]
+            if kind == self._root and self._has_attitude:
+                made.append(f"{EULER} {ATTITUDE}_deg # [deg]")
+        if self._has_attitude:
+            made += [SEPARATOR, f"MSG: {EULER}", *(f"float64 {name} # [deg]" for name in EULER_ANGLES)]
         return "\n".join([*made, ""])
 
     def convert(self, message: bytes) -> bytes:
@@ -64,17 +77,26 @@ class Degrees:
         Raises
         ------
         RecordingError
-            It is none of the type.
+            It is none of the type, or has the most significant byte first.
         """
+        if message[1:2] == b"\0":
+            raise RecordingError(f"{self._root}: a message with the least byte first can be converted, this one is not")
         if self._layout is None or not self._layout.fits(message):
             self._layout = layout = Layout(self._definitions, self._root, message)
             spans = [span for name, span in layout.doubles.items() if _INDEX.sub("", name) in self.angles]
             starts = [np.arange(count) + (offset - HEAD) // 8 for offset, count in spans]
             self._indices = np.concatenate(starts) if starts else np.zeros(0, np.int64)
+            if self._has_attitude:
+                self._quaternion = [(layout.doubles[f"{ATTITUDE}.{axis}"][0] - HEAD) // 8 for axis in "wxyz"]
         data = bytearray(message)
         values = np.frombuffer(data, "<f8", (len(data) - HEAD) // 8, HEAD)
         values[self._indices] *= 180.0 / math.pi
-        return bytes(data)
+        if not self._has_attitude:
+            return bytes(data)
+        heading, pitch, roll = quaternion_to_euler(values[self._quaternion])
+        end = self._layout.size
+        gap = bytes(-(end - HEAD) % 8)  # in front of a float64
+        return bytes(data[:end]) + gap + np.degrees((roll, pitch, heading)).tobytes()
 
     def _changed(self, kind: str) -> str:
         """Name of a type, another one if its fields have other names."""

@@ -47,6 +47,12 @@ def numbers(value, name=""):
         yield name, value
 
 
+def without_attitude(message):
+    """A message less what was put behind it, if anything was."""
+    kept = [one for one in dataclasses.fields(message) if one.name not in ("attitude_deg", "__msgtype__")]
+    return dataclasses.make_dataclass("Rest", [one.name for one in kept])(*(getattr(message, one.name) for one in kept))
+
+
 def test_angles_are_in_degrees_and_nothing_else_changes(messages):
     seen = set()
     for topic, (schema, kept) in messages.items():
@@ -56,7 +62,7 @@ def test_angles_are_in_degrees_and_nothing_else_changes(messages):
             continue
         before, after = reader(schema.name, definition), reader(degrees.type_name, degrees.definition)
         for data in kept:
-            old, new = numbers(before(data)), numbers(after(degrees.convert(data)))
+            old, new = numbers(before(data)), numbers(without_attitude(after(degrees.convert(data))))
             for (name, value), (shown, turned) in zip(old, new, strict=True):
                 if name == shown:
                     assert np.array_equal(turned, value)
@@ -65,6 +71,40 @@ def test_angles_are_in_degrees_and_nothing_else_changes(messages):
                     assert shown.replace("_deg", "") == name
                     assert turned == pytest.approx(np.degrees(value), rel=1e-15)
     assert seen >= WITH_ANGLES
+
+
+def turn(axis, angle):
+    """Matrix of a right-handed turn about an axis."""
+    made, (i, j) = np.eye(3), ((1, 2), (2, 0), (0, 1))[axis]
+    made[i, i] = made[j, j] = math.cos(angle)
+    made[j, i] = math.sin(angle)
+    made[i, j] = -made[j, i]
+    return made
+
+
+@pytest.mark.parametrize("contacts", [0, 1, 3])
+def test_an_attitude_comes_with_roll_pitch_and_heading(messages, contacts):
+    """They turn NED into body axes in the order heading, pitch, roll; what is in front of them stays."""
+    schema, kept = messages["/state"]
+    definition = schema.data.decode()
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(definition, schema.name))
+    vector, contact = (store.types[name] for name in ("geometry_msgs/msg/Vector3", "sbs_msgs/msg/ContactState"))
+    point = contact(vector(1.0, 2.0, 3.0), 0.1, 0.2, 0.3)
+    w, x, y, z = 0.8, 0.2, -0.4, 0.4
+    attitude = store.types["geometry_msgs/msg/Quaternion"](x, y, z, w)
+    message = dataclasses.replace(
+        store.deserialize_cdr(kept[0], schema.name), attitude=attitude, contacts=[point] * contacts
+    )
+
+    degrees = Degrees(schema.name, definition)
+    converted = degrees.convert(bytes(store.serialize_cdr(message, schema.name)))
+    shown = reader(degrees.type_name, degrees.definition)(converted)
+    angles = np.radians([shown.attitude_deg.heading, shown.attitude_deg.pitch, shown.attitude_deg.roll])
+    turned = turn(2, angles[0]) @ turn(1, angles[1]) @ turn(0, angles[2])
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    np.testing.assert_allclose(turned, np.eye(3) + 2.0 * (w * cross + cross @ cross), atol=1e-14)
+    assert [one.depth for one in shown.contacts] == [0.1] * contacts
 
 
 def test_angles_are_those_that_their_definition_gives_in_radians():
@@ -86,6 +126,7 @@ def test_angles_are_those_that_their_definition_gives_in_radians():
 def test_a_message_of_another_type_is_refused():
     degrees = Degrees("a/msg/B", "float64 angle # [rad]\n")
     assert degrees.convert(b"\0\1\0\0" + np.float64(math.pi).tobytes())[4:] == np.float64(180.0).tobytes()
-    for data in (b"", b"\0\1\0\0\0", b"\0\1\0\0" + bytes(20), b"\0\7\0\0" + bytes(8)):
+    reversed_ = b"\0\0\0\0" + np.array(math.pi, ">f8").tobytes()
+    for data in (b"", reversed_, b"\0\1\0\0\0", b"\0\1\0\0" + bytes(20), b"\0\7\0\0" + bytes(8)):
         with pytest.raises(RecordingError):
             degrees.convert(data)

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import foxglove
-from nav_msgs.msg import Odometry
+from geometry_msgs.msg import PoseStamped, TransformStamped
+from nav_msgs.msg import Odometry, Path
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 
@@ -16,7 +17,7 @@ from sbs_sim.nodes.odometry_views import PathOf, pose_of, transform_of
 from sbs_sim.recording import message_definition
 from sbs_sim.recording.degrees import Degrees
 
-Convert = Callable[[bytes], bytes | None]
+Convert = Callable[[bytes, bool], bytes | None]  # of a message, and whether for one who comes late
 
 
 class ViewerTopic:
@@ -45,26 +46,25 @@ class ViewerTopic:
         degrees = Degrees(name, definition)
         if degrees.angles:
             made = self._made(context, f"{topic}_deg", degrees.type_name, degrees.definition)
-            self._views.append((made, degrees.convert))
+            self._views.append((made, lambda data, _late: degrees.convert(data)))
         if kind is Odometry:
-            self._add_view(context, "pose", pose_of)
-            self._add_view(context, "path", PathOf())
+            self._add_view(context, "pose", PoseStamped, lambda message, _late: pose_of(message))
+            self._add_view(context, "path", Path, PathOf())
 
     def add_transform(self, context: Any) -> None:
         """Have a transform made of an odometry, where nobody publishes any."""
         if self.kind is Odometry:
-            self._add_view(context, "tf", transform_of)
+            self._add_view(context, "tf", TransformStamped, lambda message, _late: transform_of(message))
 
     def _made(self, context: Any, topic: str, name: str, definition: str) -> foxglove.Channel:
         schema = foxglove.Schema(name=name, encoding="ros2msg", data=definition.encode())
         return foxglove.Channel(topic, schema=schema, message_encoding="cdr", context=context)
 
-    def _add_view(self, context: Any, suffix: str, make: Callable[[Odometry], Any]) -> None:
+    def _add_view(self, context: Any, suffix: str, kind: Any, make: Callable[[Odometry, bool], Any]) -> None:
         """A channel of what is made of an odometry."""
-        kind = type(make(Odometry()))
 
-        def convert(data: bytes) -> bytes | None:
-            made = make(deserialize_message(data, Odometry))
+        def convert(data: bytes, late: bool) -> bytes | None:
+            made = make(deserialize_message(data, Odometry), late)
             return None if made is None else bytes(serialize_message(made))
 
         self._views.append((self._made(context, f"{self.topic}_{suffix}", *type_and_definition(kind)), convert))
@@ -101,7 +101,7 @@ class ViewerTopic:
     ) -> None:
         try:
             with self._lock:
-                made = convert(data)
+                made = convert(data, client is not None)
         except RecordingError:  # a text that cannot be read, for example
             return
         if made is not None:

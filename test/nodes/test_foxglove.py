@@ -15,6 +15,7 @@ from websockets.sync.client import connect
 pytest.importorskip("rclpy")
 
 from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 from ros_harness import DOMAINS, PATIENCE, controls_message, world
 from std_srvs.srv import SetBool
@@ -22,6 +23,8 @@ from std_srvs.srv import SetBool
 from sbs_msgs.msg import BodyState, Controls, FlightEvent
 from sbs_msgs.srv import Step
 from sbs_sim.errors import SbsError
+from sbs_sim.nodes.conversions import to_time
+from sbs_sim.nodes.odometry_views import PathOf
 from sbs_sim.nodes.simulator import PARAMETERS, foxglove_server
 
 MESSAGE, TIME, RESPONSE = 1, 2, 3  # binary opcodes of the server
@@ -176,7 +179,27 @@ def test_topics_arrive_in_the_bytes_of_ros_with_their_definitions(flight, viewer
     assert pose.header.frame_id == moved.header.frame_id == "odom"
     assert moved.child_frame_id == "base_link"
     path = viewer.reader("/odom_path")(viewer.messages["/odom_path"][-1][1])
+    assert {one.header.frame_id for one in path.poses} == {"odom"}  # with another one viewers show nothing of it
     assert path.poses[-1].pose.position.z == pytest.approx(pose.pose.position.z, abs=0.1)
+
+
+def test_who_comes_late_gets_the_path_between_two_poses_of_it():
+    def odometry(seconds):
+        message = Odometry()
+        message.header.stamp = to_time(seconds)
+        message.pose.pose.position.x = seconds
+        return message
+
+    def way(path):
+        return path and [pose.pose.position.x for pose in path.poses]
+
+    path = PathOf()
+    assert way(path(odometry(1.0), late=True)) == [1.0]
+    assert way(path(odometry(1.0))) == [1.0]
+    assert path(odometry(1.25)) is None
+    assert way(path(odometry(1.25), late=True)) == [1.0, 1.25]
+    assert way(path(odometry(1.5))) == [1.0, 1.5]
+    assert way(path(odometry(0.0), late=True)) == way(path(odometry(0.0))) == [0.0]  # of another flight
 
 
 def stamp_of(message):
@@ -187,8 +210,12 @@ def test_services_are_called_and_a_late_client_of_a_paused_flight_sees_it(viewer
     paused = viewer.call("/pause", serialize_message(SetBool.Request(data=True)))
     assert deserialize_message(paused, SetBool.Response).message == "paused"
     with contextlib.closing(Viewer(flight.port)) as late:
-        late.subscribe("/state", "/rotors_deg")
-        late.until(lambda: late.messages["/state"] and late.messages["/rotors_deg"], "the state of a paused flight")
+        shown = "/state", "/rotors_deg", "/odom_path"
+        late.subscribe(*shown)
+        late.until(lambda: all(late.messages[topic] for topic in shown), "the state of a paused flight")
+        with contextlib.closing(Viewer(flight.port)) as later:  # no pose of the path is due since
+            later.subscribe("/odom_path")
+            later.until(lambda: later.messages["/odom_path"], "the path of a paused flight")
         before = late.messages["/state"][-1][0]
         stepped = viewer.call("/step", serialize_message(Step.Request(ticks=1)))
         assert deserialize_message(stepped, Step.Response).success

@@ -42,6 +42,7 @@ class FoxgloveClients:
         self._node = node
         self._types: dict[str, Any] = {}  # of the topics that may be published
         self._publications: dict[tuple[int, int], tuple[Any, Fit]] = {}
+        self._refusals: dict[tuple[int, int], SbsError] = {}  # of channels, until a message comes on them
         self._calls: dict[str, Any] = {}
         self._refused = Rejections(node, "message of a Foxglove client")
         self._end = threading.Event()
@@ -91,8 +92,11 @@ class FoxgloveClients:
         client.remove_pending_request(future)
         raise SbsError(f"no answer of {name}")
 
-    def advertise(self, client: int, channel: Any) -> str:
-        """Prepare what a client wants to publish; why not, or nothing."""
+    def advertise(self, client: int, channel: Any) -> None:
+        """Prepare what a client wants to publish.
+
+        Why not is told with its first message: 3D panels advertise goals and points that nobody may ever send.
+        """
         try:
             wanted = self._types.get(channel.topic)
             if wanted is None:
@@ -108,18 +112,20 @@ class FoxgloveClients:
             fit = Fit(parse(name, definition), short_name(name))
             self._publications[client, channel.id] = publisher, fit
         except SbsError as error:
-            return self._refusal(error)
-        return ""
+            if len(self._refusals) < MAX_PUBLICATIONS:
+                self._refusals[client, channel.id] = error
 
     def unadvertise(self, client: int, channel: int) -> None:
         """A client has left, or publishes this no longer."""
+        self._refusals.pop((client, channel), None)
         if (publication := self._publications.pop((client, channel), None)) is not None:
             self._node.destroy_publisher(publication[0])
 
     def publish(self, client: int, channel: int, data: bytes) -> str:
         """Publish a message of a client; why not, or nothing."""
         if (publication := self._publications.get((client, channel))) is None:
-            return ""  # which was refused when it was advertised
+            refused = self._refusals.pop((client, channel), None)
+            return "" if refused is None else self._refusal(refused)
         publisher, fit = publication
         try:
             fit.check(data)

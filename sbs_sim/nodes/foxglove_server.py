@@ -159,7 +159,7 @@ class FoxgloveServer(Component):
     def on_client_advertise(self, client: Any, channel: Any) -> None:
         """See `foxglove.websocket.ServerListener`."""
         if self._visitors is not None:
-            self._told(self._visitors.advertise(client.id, channel))
+            self._visitors.advertise(client.id, channel)
 
     def on_client_unadvertise(self, client: Any, client_channel_id: int) -> None:
         """See `foxglove.websocket.ServerListener`."""

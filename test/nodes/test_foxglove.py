@@ -257,10 +257,15 @@ def test_controls_fly_the_aircraft(flight, viewer):
 
 
 def test_what_is_malformed_is_refused_and_the_flight_goes_on(flight, viewer):
-    viewer.advertise("/state", "sbs_msgs/msg/BodyState")
-    viewer.advertise("/controls", "sbs_msgs/msg/Wind")
-    viewer.advertise("/controls", "sbs_msgs/msg/Controls", encoding="json")
+    viewer.advertise("/initialpose", "geometry_msgs/PoseWithCovarianceStamped")  # as every 3D panel does
+    wrong = [
+        viewer.advertise("/state", "sbs_msgs/msg/BodyState"),
+        viewer.advertise("/controls", "sbs_msgs/msg/Wind"),
+        viewer.advertise("/controls", "sbs_msgs/msg/Controls", encoding="json"),
+    ]
     number = viewer.advertise("/controls", "sbs_msgs/msg/Controls")
+    for refused in wrong * 2:
+        viewer.publish(refused, b"")
     whole = serialize_message(controls_message([0.2, 0.0, 0.0, 0.0]))
     for data in (b"", whole[:-9], whole + bytes(8), b"\0\7\0\0" + whole[4:], b"\0\1\0\0" + b"\xff" * 60):
         viewer.publish(number, data)
@@ -269,7 +274,8 @@ def test_what_is_malformed_is_refused_and_the_flight_goes_on(flight, viewer):
         viewer.send(data)
     viewer.until(lambda: len(viewer.status) >= 12, "what is refused")
     said = "\n".join(viewer.status)
-    assert "topic '/state': allowed are " in said
+    assert said.count("topic '/state': allowed are ") == 1
+    assert "initialpose" not in said + flight.simulator.output
     assert "allowed is sbs_msgs/msg/Controls in cdr" in said
     assert "does not agree with the definition of sbs_msgs/Controls" in said
     assert viewer.call("/pause", b"{}", b"json") == "Unsupported encoding"

@@ -14,7 +14,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sbs_msgs.msg import BodyState, Controls, FlightEvent, SimulationStatus
 from sbs_sim.errors import SbsError
 from sbs_sim.nodes.component import Component
-from sbs_sim.nodes.conversions import body_array, to_seconds, touching_share
+from sbs_sim.nodes.conversions import body_array, to_seconds, to_time, touching_share
 from sbs_sim.nodes.diagnostics import DIAGNOSTICS_PERIOD, diagnostic_status
 from sbs_sim.nodes.pilot_conversions import check_event, controls_message
 from sbs_sim.nodes.qos import COMMAND_QOS, EVENT_QOS, STATE_QOS
@@ -126,4 +126,6 @@ class PilotNode(Component):
         refused = {"rejected_states": self._bad_states.count, "rejected_events": self._bad_events.count}
         values = {"paused": self._paused, **refused, **self.values()}
         status = diagnostic_status(self.get_name(), [(DiagnosticStatus.WARN, text) for text in problems], values)
-        self._health.publish(DiagnosticArray(status=[status]))
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = to_time(self.time)
+        self._health.publish(message)

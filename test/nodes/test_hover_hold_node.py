@@ -8,6 +8,7 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy")
 
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PoseStamped  # noqa: E402
 from ros_harness import DOMAINS, world  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
@@ -73,6 +74,16 @@ def at(place, heading=0.0, within=0.1):
         )
 
     return check
+
+
+def test_its_diagnostics_have_the_time_of_the_flight(client):
+    client.watch("diagnostics", DiagnosticArray)
+    health = client.next("diagnostics", lambda array: array.status[0].name == "hover_hold" and stamp(array) > 0.0)
+    assert stamp(health) <= stamp(client.next("state"))  # without a stamp viewers find them stale
+
+
+def stamp(message):
+    return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
 
 
 def test_it_prints_its_design(flight):

@@ -13,6 +13,8 @@ COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b")
 XYZ = ("x", "y", "z")
 CONTROLS = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential_longitudinal_cyclic")
 ROTORS = (0, 1)
+LIVE = 30  # s of a live flight that Lichtblick shows
+LEGEND, LETTER = 118, 8.5  # pixels of its width that Lichtblick is asked for without text, and for a letter
 Curve = tuple[str, str, str]  # path of the field, label, what Foxglove does with it
 DEGREES, PLAIN = ".@rad2deg", ""
 
@@ -27,7 +29,7 @@ TABS: dict[str, dict[str, list[Curve]]] = {
             (f"/state.angular_velocity.{axis}", name, DEGREES) for axis, name in zip(XYZ, "pqr", strict=True)
         ],
         "Attitude, body to NED [-]": [(f"/state.attitude.{axis}", f"q{axis}", PLAIN) for axis in ("w", *XYZ)],
-        "Controls [deg]": [(f"/controls.{name}", name, DEGREES) for name in CONTROLS],
+        "Controls [deg]": [(f"/controls.{name}", name.replace("_cyclic", ""), DEGREES) for name in CONTROLS],
         "Height [m]": [("/odom.pose.pose.position.z", "height", PLAIN)],
     },
     "Rotors": {
@@ -49,9 +51,9 @@ TABS: dict[str, dict[str, list[Curve]]] = {
             for field, name in (("uniform", "lambda0"), ("sine", "lambdas"), ("cosine", "lambdac"))
         ],
         "Swashplates [deg]": [
-            (f"/swashplate.rotors[{j}].{field}", f"{field}({j + 1})", DEGREES)
+            (f"/swashplate.rotors[{j}].{field}{cyclic}", f"{field}({j + 1})", DEGREES)
             for j in ROTORS
-            for field in ("collective", "lateral_cyclic", "longitudinal_cyclic")
+            for field, cyclic in (("collective", ""), ("lateral", "_cyclic"), ("longitudinal", "_cyclic"))
         ],
     },
     "Simulation": {
@@ -110,13 +112,25 @@ def foxglove() -> dict:
 
 
 def lichtblick() -> dict:
-    """The same for Lichtblick, which knows no modifiers and shows paths and poses, but no odometry."""
+    """The same for Lichtblick, which knows no modifiers and shows paths and poses, but no odometry.
+
+    It shows a flight live: plots and view follow it. Legends lie beside the curves, which fill the plots then. It gives
+    messages the time at which they come, so that the plots take that of their headers where there is one.
+    """
     layout = foxglove()
     for panel in layout["configById"].values():
+        if "paths" in panel:
+            panel["lichtblickPanelTitle"] = panel.pop("foxglovePanelTitle")
+            width = LEGEND + LETTER * max(len(path["label"]) for path in panel["paths"])
+            panel |= {"followingViewWidth": LIVE, "legendDisplay": "left", "sidebarDimension": round(width)}
         for path in panel.get("paths", []):
+            path["timestampMethod"] = "receiveTime" if path["value"].startswith("/controls.") else "headerStamp"
             path["value"] = in_degrees(path["value"])
     scene = layout["configById"]["3D!view"]
-    scene["topics"] = {"/odom_path": {"visible": True}, "/odom_pose": {"visible": True}}
+    scene |= {"followMode": "follow-position", "followTf": "base_link"}
+    scene["cameraState"]["distance"] = 8
+    scene["scene"] = {"transforms": {"showLabel": False, "axisScale": 0, "lineWidth": 0}}  # `frames` has dozens
+    scene["topics"] = {"/odom_path": {"visible": True, "lineWidth": 0.05}, "/odom_pose": {"visible": True}}
     urdf = {"layerId": "foxglove.Urdf", "sourceType": "topic", "topic": "/robot_description", "visible": True}
     scene["layers"]["urdf"] = {"instanceId": "urdf", "label": "URDF", "order": 2, **urdf}
     return layout

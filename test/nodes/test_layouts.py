@@ -92,6 +92,18 @@ def test_every_path_of_lichtblick_is_of_a_topic_or_of_one_that_the_server_makes_
             check(log, topic, field)
 
 
+def test_plots_of_lichtblick_follow_the_time_of_headers(log):
+    plots = [panel for panel in foxglove("lichtblick")["configById"].values() if "paths" in panel]
+    assert len(plots) == len({panel["lichtblickPanelTitle"] for panel in plots}) > 10
+    for panel in plots:
+        assert panel["followingViewWidth"] > 0.0
+        for path in panel["paths"]:
+            topic = path["value"].partition(".")[0].removesuffix("_deg").lstrip("/")
+            stamp = log[topic]["header.stamp.sec"] + 1e-9 * log[topic]["header.stamp.nanosec"]
+            stamped = np.allclose(stamp, log[topic].time, rtol=0.0, atol=1e-9)
+            assert path["timestampMethod"] == ("headerStamp" if stamped else "receiveTime")
+
+
 def parsed(schema):
     """Definitions of a schema, and the name of its type in them."""
     return parse(schema.name, schema.data.decode()), short_name(schema.name)

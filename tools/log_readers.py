@@ -93,6 +93,30 @@ for _, topic, row in sorted(rows, key=lambda row: row[0]):
 end()
 """
 )
+# The curves of a layout by another implementation of the paths that Foxglove has.
+PATHS = """
+import json, math, sys
+from mcap.reader import make_reader
+from mcap_ros2_support_fast.decoder import DecoderFactory
+from ros_parser.message_path import parse_message_path
+with open(sys.argv[2]) as file:
+    panels = json.load(file)["configById"].values()
+paths, values = {}, {}
+for text in (path["value"] for panel in panels for path in panel.get("paths", [])):
+    plain, _, change = text.partition(".@")
+    parsed = parse_message_path(text), parse_message_path(plain)
+    paths.setdefault(plain.split(".")[0], []).append((text, *parsed, change))
+with open(sys.argv[1], "rb") as file:
+    for _, channel, _, message in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+        for text, whole, plain, change in paths.get(channel.topic, ()):
+            before = plain.apply(message)
+            right = whole.apply(message) == (math.degrees(before) if change == "degrees" else before)
+            values.setdefault(text, []).append(right)
+missing = sum(map(len, paths.values())) - len(values)
+rights = [right for one in values.values() for right in one]
+wrong = rights.count(False)
+print(json.dumps(f"{len(values)} curves, {len(rights)} values; {missing} curves empty, {wrong} values wrong"))
+"""
 NODE = """
 import { McapIndexedReader } from "@mcap/core";
 import { parse } from "@foxglove/rosmsg";
@@ -136,6 +160,7 @@ PYTHON = {
     "rosbags": (("rosbags==0.11.9",), ROSBAGS),
     "rerun": (("rerun-sdk==0.41.0",), RERUN),
 }
+PATH_PACKAGES = ("mcap==1.6.0", "mcap-ros2-support-fast==0.8.0", "ros-parser==0.9.0")
 PACKAGES = ("@mcap/core@2.2.2", "@foxglove/rosmsg@5.0.5", "@foxglove/rosmsg2-serialization@3.1.0", "fzstd@0.1.1")
 COMMANDS = {"pymcap-cli": ("pymcap-cli==0.34.0", ("info", "doctor"))}  # only looked at for their exit code
 
@@ -199,6 +224,9 @@ def main() -> None:
             programs = environment(folder / reader, packages)
             said = verdict(answer([programs / "python", "-c", code, log]), wanted)
             print(f"| {', '.join(packages)} | {said} |", flush=True)
+        programs = environment(folder / "paths", PATH_PACKAGES)
+        said = answer([programs / "python", "-c", PATHS, log, ROOT / "config" / "layouts" / "foxglove.json"])
+        print(f"| {', '.join(PATH_PACKAGES)}, curves of foxglove.json | {said} |", flush=True)
         for reader, (package, words) in COMMANDS.items():
             programs = environment(folder / reader, [package])
             for word in words:

@@ -5,6 +5,7 @@ simulator's server has in degrees, and PlotJuggler shows radians.
 """
 
 import json
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,8 +16,10 @@ CONTROLS = ("collective", "lateral_cyclic", "longitudinal_cyclic", "differential
 ROTORS = (0, 1)
 LIVE = 30  # s of a live flight that Lichtblick shows
 LEGEND, LETTER = 118, 8.5  # pixels of its width that Lichtblick is asked for without text, and for a letter
+ATTITUDE = "Attitude, body to NED [-]"
+ANGLES = "Attitude [deg]", ("roll", "pitch", "heading")  # in its place, of sbs_sim/recording/degrees.py
 Curve = tuple[str, str, str]  # path of the field, label, what Foxglove does with it
-DEGREES, PLAIN = ".@rad2deg", ""
+DEGREES, PLAIN = ".@degrees", ""
 
 # tab: plots of it, each a title with the unit in Foxglove and curves
 TABS: dict[str, dict[str, list[Curve]]] = {
@@ -28,7 +31,7 @@ TABS: dict[str, dict[str, list[Curve]]] = {
         "Rates, body [deg/s]": [
             (f"/state.angular_velocity.{axis}", name, DEGREES) for axis, name in zip(XYZ, "pqr", strict=True)
         ],
-        "Attitude, body to NED [-]": [(f"/state.attitude.{axis}", f"q{axis}", PLAIN) for axis in ("w", *XYZ)],
+        ATTITUDE: [(f"/state.attitude.{axis}", f"q{axis}", PLAIN) for axis in ("w", *XYZ)],
         "Controls [deg]": [(f"/controls.{name}", name.replace("_cyclic", ""), DEGREES) for name in CONTROLS],
         "Height [m]": [("/odom.pose.pose.position.z", "height", PLAIN)],
     },
@@ -82,7 +85,7 @@ def main() -> None:
 # --- Foxglove ---------------------------------------------------------------------------------------------------
 
 
-def foxglove() -> dict:
+def foxglove(shown: Mapping[str, Mapping[str, list[Curve]]] = TABS) -> dict:
     """Tabs of plots, in the last one a view from above and the health beside the plots."""
     panels: dict[str, dict] = {
         "3D!view": view(),
@@ -91,7 +94,7 @@ def foxglove() -> dict:
         "RawMessages!events": {"topicPath": "/events"},
     }
     tabs = []
-    for tab, plots in TABS.items():
+    for tab, plots in shown.items():
         names = []
         for number, (title, curves) in enumerate(plots.items()):
             names.append(f"Plot!{tab.lower()}{number}")
@@ -117,7 +120,7 @@ def lichtblick() -> dict:
     It shows a flight live: plots and view follow it. Legends lie beside the curves, which fill the plots then. It gives
     messages the time at which they come, so that the plots take that of their headers where there is one.
     """
-    layout = foxglove()
+    layout = foxglove({tab: dict(readable(plots)) for tab, plots in TABS.items()})
     for panel in layout["configById"].values():
         if "paths" in panel:
             panel["lichtblickPanelTitle"] = panel.pop("foxglovePanelTitle")
@@ -134,6 +137,16 @@ def lichtblick() -> dict:
     urdf = {"layerId": "foxglove.Urdf", "sourceType": "topic", "topic": "/robot_description", "visible": True}
     scene["layers"]["urdf"] = {"instanceId": "urdf", "label": "URDF", "order": 2, **urdf}
     return layout
+
+
+def readable(plots: Mapping[str, list[Curve]]) -> Iterator[tuple[str, list[Curve]]]:
+    """The plots, with roll, pitch and heading in place of the quaternion."""
+    title, angles = ANGLES
+    for name, curves in plots.items():
+        if name == ATTITUDE:
+            yield title, [(f"/state_deg.attitude_deg.{angle}", angle, PLAIN) for angle in angles]
+        else:
+            yield name, curves
 
 
 def in_degrees(path: str) -> str:

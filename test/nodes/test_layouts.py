@@ -21,7 +21,7 @@ from sbs_sim.recording.degrees import Degrees
 
 ROOT = Path(__file__).resolve().parents[2]
 LAYOUTS = config_folder() / "layouts"
-MODIFIERS = {"@rad2deg"}  # those of Foxglove's message paths that are used
+MODIFIERS = {"@degrees"}  # those of Foxglove's message paths that are used
 
 
 @pytest.fixture(scope="module")
@@ -81,8 +81,12 @@ def test_every_path_of_lichtblick_is_of_a_topic_or_of_one_that_the_server_makes_
                 fields = decode(made, *parsed(made), [degrees.convert(message.data)])
                 in_degrees[f"{channel.topic}_deg"] = fields
     paths = foxglove_paths("lichtblick")
-    assert len(paths) == len(foxglove_paths())
-    assert sum("_deg" in path for path in paths) == sum("@rad2deg" in path for path in foxglove_paths())
+    angles = [path for path in paths if "attitude" in path]
+    assert [path.rpartition(".")[2] for path in angles] == ["roll", "pitch", "heading"]  # in place of a quaternion
+    quaternion = [path for path in foxglove_paths() if "attitude" in path]
+    assert len(paths) - len(angles) == len(foxglove_paths()) - len(quaternion)
+    converted = sum("@degrees" in path for path in foxglove_paths())
+    assert sum("_deg" in path for path in paths) == converted + len(angles)
     for path in paths:
         topic, _, field = path.partition(".")
         assert "@" not in path

@@ -16,9 +16,11 @@ def recorded_qos(profiles: str) -> QoSProfile:
     try:
         profile = YAML(typ="safe", pure=True).load(profiles)[0]
         keep_all = profile["history"] in ("keep_all", 2)
+        # `ros2 bag record` writes 0: DDS does not tell others how many messages a publisher keeps
+        depth = int(profile["depth"]) or STATE_QOS.depth
         return QoSProfile(
             history=HistoryPolicy.KEEP_ALL if keep_all else HistoryPolicy.KEEP_LAST,
-            depth=min(max(1, int(profile["depth"])), MAX_DEPTH),
+            depth=min(max(1, depth), MAX_DEPTH),
             reliability=_one_of(ReliabilityPolicy, profile["reliability"], ("reliable", 1)),
             durability=_one_of(DurabilityPolicy, profile["durability"], ("transient_local", 1)),
         )

@@ -16,6 +16,7 @@ from foreign_logs import merge
 
 rclpy = pytest.importorskip("rclpy")
 
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy  # noqa: E402
 from recorded_flights import HOVER_STEP, STATE_TOPICS, assert_identical, fly, replay, wiggle  # noqa: E402
 from ros_harness import (  # noqa: E402
     DOMAINS,
@@ -38,6 +39,7 @@ from sbs_msgs.msg import (  # noqa: E402
 from sbs_sim import Aircraft, trim  # noqa: E402
 from sbs_sim.errors import RecordingError  # noqa: E402
 from sbs_sim.nodes.log_player import is_shared  # noqa: E402
+from sbs_sim.nodes.recorded_qos import recorded_qos  # noqa: E402
 from sbs_sim.nodes.what_if import fly_with  # noqa: E402
 from sbs_sim.recording import read  # noqa: E402
 from sbs_sim.recording.recorded_flight import flight_of  # noqa: E402
@@ -340,6 +342,19 @@ def test_a_log_of_another_writer_is_played(tmp_path):
     for topic, (*_, why) in left_out.items():
         assert any(f"{topic}: left out" in line and why in line for line in output.splitlines()), output
     assert "Traceback" not in output
+
+
+def test_a_depth_that_the_log_does_not_know_is_that_of_state_topics():
+    """What `ros2 bag record` of rosbag2 0.26.5 writes with Fast DDS, which does not tell it history and depth."""
+    qos = recorded_qos(
+        "- history: unknown\n  depth: 0\n  reliability: reliable\n  durability: transient_local\n  deadline:\n"
+        "    sec: 9223372036\n    nsec: 854775807\n  liveliness: automatic\n"
+    )
+    assert (qos.history, qos.depth) == (HistoryPolicy.KEEP_LAST, 10)
+    assert (qos.reliability, qos.durability) == (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
+    for depth, kept in ((1, 1), (100, 100)):
+        text = f"- {{history: keep_last, depth: {depth}, reliability: reliable, durability: volatile}}"
+        assert recorded_qos(text).depth == kept
 
 
 def test_messages_that_are_none_are_left_out_and_all_others_are_played(tmp_path):

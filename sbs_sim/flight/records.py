@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +69,27 @@ class Snapshot(Instants[int, float]):
     """
 
     derivative: Array = field(default_factory=lambda: np.empty(0))
+
+
+class Motion(NamedTuple):
+    """What sensors on board see of an instant.
+
+    Attributes
+    ----------
+    state : ndarray, shape (size,)
+        Simulation state.
+    specific_force : ndarray, shape (3,)
+        Of the c.g. in body axes [m/s^2]: the inertial acceleration without gravity.
+    wind : ndarray, shape (3,)
+        Velocity of the air, NED [m/s].
+    derivative : ndarray
+        See `Snapshot`.
+    """
+
+    state: Array
+    specific_force: Array
+    wind: Array
+    derivative: Array
 
 
 class Rows(Instants[NDArray[np.int64], Array]):

@@ -22,18 +22,18 @@ from sbs_sim.errors import SimulationError
 from sbs_sim.flight.contact import amplification, check_step, ground_forces
 from sbs_sim.flight.engine import Engine
 from sbs_sim.flight.formation import Flown, Formation
-from sbs_sim.flight.records import Event, Snapshot
+from sbs_sim.flight.records import Event, Motion, Snapshot
 from sbs_sim.flight.rotor_matrices import RotorMatrices, arranged, rotor_matrices
 from sbs_sim.model import state as S
 from sbs_sim.model.air import air_in_space
 from sbs_sim.model.frames import down_of
 from sbs_sim.model.ground import lowest_point
-from sbs_sim.model.integrate import ETD, FLYING, PARTITIONED, RK4, TSIT5, advance, azimuths_at
+from sbs_sim.model.integrate import ETD, FLYING, PARTITIONED, RK4, TSIT5, azimuths_at
 from sbs_sim.model.records import NOISE, Space
 from sbs_sim.model.ring_noise import RingNoise
 from sbs_sim.model.solve import length
 from sbs_sim.model.wind import Wind, WindField, winds_at
-from sbs_sim.model.working_state import WORKING_SIZE, working_state
+from sbs_sim.model.working_state import WORKING_SIZE
 
 if TYPE_CHECKING:
     from sbs_sim.flight.stitched import StitchedModel
@@ -363,10 +363,11 @@ class Simulation:
             The next step would leave the finite or the plausible: the message names step, time and state. The state
             is that of the last good step.
         """
-        engine, failed = self.engine, np.full(1, FLYING)
-        advance(
+        engine, failed = self.engine, np.array([FLYING])
+        code = engine.code
+        code.advance(
             *(
-                engine.code.derivative,
+                code.derivative,
                 engine.model,
                 _single(self.state),
                 _single(self.swashplate),
@@ -451,8 +452,34 @@ class Simulation:
         azimuths_at(self.model.rotors, _single(self.azimuth0), times, angles)
         return angles[..., 0]
 
+    def motion(self) -> Motion:
+        """What sensors on board see of the present instant: less than a snapshot, for a third of its time."""
+        return self._evaluated()[1]
+
     def snapshot(self) -> Snapshot:
         """The present instant, with loads and accelerations under the swashplate angles now in force."""
+        azimuth, now = self._evaluated()
+        engine = self.engine
+        working = engine.memory(engine.rotors, WORKING_SIZE)
+        engine.code.working_state(engine.model, engine.work, working)
+        contact = ground_forces(self.model, self.state[np.newaxis])
+        down = down_of(self.state[np.newaxis, S.ATTITUDE : S.VELOCITY])[0]
+        return Snapshot(
+            step=self.step,
+            time=self.time,
+            state=now.state,
+            acceleration=now.specific_force + down * self.aircraft.environment.gravity,
+            swashplate=self.swashplate.copy(),
+            azimuth=self.aircraft.turned(azimuth, self.state),
+            loads=engine.work.load_rows.reshape(engine.rotors, -1).copy(),
+            wind=now.wind,
+            working=working[..., 0],
+            contact=None if contact is None else contact[0],
+            derivative=now.derivative,
+        )
+
+    def _evaluated(self) -> tuple[Array, Motion]:
+        """Azimuths of the rotors against their drives, and the instant; the rest is left in the engine's memory."""
         engine, now = self.engine, np.array([self.step])
         azimuth, air = self.azimuths(now)[0], engine.memory(engine.air_rows)
         air[:3, 0] = self.air_at(now, self._air[np.newaxis])[0]
@@ -461,28 +488,17 @@ class Simulation:
             air_in_space(
                 *(engine.model, _single(self.state), _single(azimuth), wind, self.time, engine.tick.space, air)
             )
-        working = engine.memory(engine.rotors, WORKING_SIZE)
         noise = self.ring_noise(now)
         if noise is not None:
             engine.work.ring[NOISE] = noise.T
-        engine.derivative(
+        engine.code.derivative(
             *(engine.model, _single(self.state), _single(self.swashplate), _single(azimuth), air),
             *(engine.work, engine.tick.slopes[0], True),
         )
-        working_state(engine.model, engine.work, working)
-        contact = ground_forces(self.model, self.state[np.newaxis])
-        down = down_of(self.state[np.newaxis, S.ATTITUDE : S.VELOCITY])[0]
-        return Snapshot(
-            step=self.step,
-            time=self.time,
+        return azimuth, Motion(
             state=self.state.copy(),
-            acceleration=engine.work.acceleration_rows[:3, 0] + down * self.aircraft.environment.gravity,
-            swashplate=self.swashplate.copy(),
-            azimuth=self.aircraft.turned(azimuth, self.state),
-            loads=engine.work.load_rows.reshape(engine.rotors, -1).copy(),
+            specific_force=engine.work.acceleration_rows[:3, 0].copy(),
             wind=air[:3, 0].copy(),
-            working=working[..., 0],
-            contact=None if contact is None else contact[0],
             derivative=engine.tick.slopes[0, : self.layout.size, 0].copy(),
         )
 

@@ -16,7 +16,7 @@ from sbs_sim.flight.actuation import Direct, Mixed, commanded_angles
 from sbs_sim.flight.controls import Commands, check_rows, command
 from sbs_sim.flight.formation import Flown
 from sbs_sim.flight.history import History, named_histories
-from sbs_sim.flight.records import Rows, Snapshot
+from sbs_sim.flight.records import Motion, Rows, Snapshot
 from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight.stitched import StitchedModel
 from sbs_sim.flight.trim_point import TrimPoint
@@ -204,6 +204,13 @@ class StitchedSimulation(Simulation):
         down = np.zeros((1, 1))
         lowest_point(self.ground, self.model.rotors, np.ascontiguousarray(self.state)[:, np.newaxis], down)
         return float(down[0, 0]) >= self.bounds[-1]
+
+    def motion(self) -> Motion:
+        """See `Simulation`."""
+        now = self.snapshot()
+        down = down_of(now.state[np.newaxis, S.ATTITUDE : S.VELOCITY])[0]
+        force = now.acceleration - down * self.aircraft.environment.gravity
+        return Motion(now.state, force, now.wind, now.derivative)
 
     def snapshot(self) -> Snapshot:
         """The present instant, see `Simulation`; without the working states of the rotors."""

@@ -209,6 +209,10 @@ class Address(WrapperAddressProtocol):
     An entry that named another one would hold its machine code a second time, optimised otherwise. By its address it
     executes the very instructions that Python does, to the same last bit.
 
+    Python may call it as well, always with arguments of the types that it was made for: that is not checked. An entry
+    itself looks at the types of all arguments at every call, and at a model's hundred arrays for longer than a
+    derivative takes.
+
     Parameters
     ----------
     function : callable
@@ -224,6 +228,11 @@ class Address(WrapperAddressProtocol):
         self._code = code  # must live as long as its address is in use
         self._pointer = int(code.library.get_pointer_to_function(code.fndesc.llvm_cfunc_wrapper_name))
         self.type = numba.types.FunctionType(code.signature)
+        self._call = code.entry_point
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it from Python, which releases the GIL meanwhile."""
+        return self._call(*arguments)
 
     def __wrapper_address__(self) -> int:
         """Address of the code, which numba asks for."""

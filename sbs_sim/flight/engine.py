@@ -120,7 +120,7 @@ class Engine:
         """Rows of the air, see `sbs_sim.model.dynamics.derivative`."""
         return len(self.tick.wind)
 
-    @property
+    @cached_property
     def code(self) -> Code:
         """Machine code of this arrangement."""
         key = (*self._arrangement, len(self.model.drives) > 0)

@@ -481,7 +481,7 @@ class Simulation:
     def _evaluated(self) -> tuple[Array, Motion]:
         """Azimuths of the rotors against their drives, and the instant; the rest is left in the engine's memory."""
         engine, now = self.engine, np.array([self.step])
-        azimuth, air = self.azimuths(now)[0], engine.memory(engine.air_rows)
+        azimuth, air = self.azimuths(now)[0], engine.tick.wind  # a step writes there too
         air[:3, 0] = self.air_at(now, self._air[np.newaxis])[0]
         if self.space is not None:
             wind = _single(self._air)

@@ -20,6 +20,7 @@ from sbs_sim.errors import SimulationError
 from sbs_sim.flight.records import Snapshot
 from sbs_sim.model import state as S
 from sbs_sim.sensors import truth
+from sbs_sim.sensors.batteries import Batteries
 from sbs_sim.sensors.errors import ErrorModel, Errors
 from sbs_sim.sensors.geodesy import Origin
 from sbs_sim.sensors.settings import NAMES, checked, error_model
@@ -29,7 +30,6 @@ Measured = Callable[[Array], Array]
 Look = Callable[[Snapshot, Measured], Array]
 
 ON_GRID = 1e-6  # of a tick, that a time may be beside a multiple
-SECONDS_PER_HOUR = 3600.0
 
 
 class Clock(NamedTuple):
@@ -209,25 +209,17 @@ def _range(_: Aircraft, values: Mapping[str, Any], ground_altitude: float) -> tu
 
 
 def _battery(aircraft: Aircraft, values: Mapping[str, Any], _: float) -> tuple[list[ErrorModel], Look]:
-    drives = [(i, drive) for i, drive in enumerate(aircraft.drives) if drive.engine == "electric"]
-    if not drives:
+    batteries = Batteries(aircraft)
+    if not len(batteries):
         raise SimulationError(
             f"parameter battery.rate = {values['battery.rate']:g}: allowed is 0 for an aircraft without a battery"
         )
-    places = np.array([aircraft.layout.drive(i)["discharge"] for i, _ in drives])
-    full, empty, capacity = (
-        np.array([getattr(drive, name) for _, drive in drives])
-        for name in ("full_voltage", "empty_voltage", "capacity")
-    )
-    numbers = np.array([float(i + 1) for i, _ in drives])
 
     def look(now: Snapshot, measured: Measured) -> Array:
-        used = now.state[places]
-        voltage = measured(full - used * (full - empty))
-        current = now.derivative[places] * capacity * SECONDS_PER_HOUR
-        return np.stack([numbers, voltage, current, (1.0 - used) * capacity, capacity], axis=1)
+        voltage, current = measured(batteries.voltage(now.state)), batteries.current(now.derivative)
+        return np.stack([batteries.numbers, voltage, current, batteries.charge(now.state), batteries.capacity], axis=1)
 
-    return [error_model(values, "battery")] * len(drives), look
+    return [error_model(values, "battery")] * len(batteries), look
 
 
 def turned(quaternion: Array, error: Array) -> Array:

@@ -48,8 +48,12 @@ def range_down(now: Snapshot, ground_altitude: float) -> float:
         Height of the ground above the origin [m]; -inf for none.
     """
     down = float(rotation_matrix(now.state[S.ATTITUDE : S.VELOCITY])[2, 2])
-    height = max(0.0, -float(now.state[2]) - ground_altitude)
-    return height / down if down > 0.0 else math.inf
+    return range_along(down, -float(now.state[2]) - ground_altitude)
+
+
+def range_along(down: float, height: float) -> float:
+    """Distance from a height [m] to the ground along a direction with a part downwards; inf where it looks up."""
+    return max(0.0, height) / down if down > 0.0 else math.inf
 
 
 def static_pressure(height: float, origin_altitude: float, temperature_offset: float) -> float:

@@ -2,11 +2,13 @@
 
 Each rate loop has one proportional gain: the largest one at which the loop, with the integral part and the delays that
 ArduPilot has, keeps the margins below. The rate of the angle loop and the integral gain follow from its crossover.
+The loop of horizontal velocity, around those of tilt, is made in the same way, and that of position follows from it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -30,26 +32,52 @@ ROTOR_SPEED, ROTOR_SPEED_CHANNEL = 31, 8  # function and servo of the throttle
 LOOP_RATE, FRAME_RATE = 200.0, 400.0
 # Hz, of the error of a rate: the differential tilt of the discs shakes the blades in lag at the rotor's speed.
 FILTERS = {"RLL": 20.0, "PIT": 20.0, "YAW": 2.0}
+GYRO_FILTER = 20.0  # Hz, of second order, ArduPilot's own
 DELAY = 1.5 / LOOP_RATE  # s: a loop from sensor to servo, and half of one that the servo holds
 GAIN_MARGIN, PHASE_MARGIN = 10 ** (8.0 / 20.0), math.radians(50.0)
 MAX_CROSSOVER = 12.0  # rad/s of a rate loop
 INTEGRAL, ANGLE = 0.15, 0.35  # of the crossover: integral gain over the proportional one, and rate of the angle loop
+# Of the loop of horizontal velocity: the ratios of ArduPilot's own gains (PSC_VELXY_ 2, 1 and copter-heli.parm's 0.5).
+VELOCITY_INTEGRAL, VELOCITY_DERIVATIVE = 0.5, 0.25  # 1/s, s: over the proportional gain
+VELOCITY_FILTER = 5.0  # Hz, of its error and of the derivative of that, ArduPilot's own
+VELOCITY_DELAY = 1.0 / LOOP_RATE  # s, of the estimate; that of the tilt is in its own loop
+SHAPING = 0.2  # s, time constant with which ArduPilot follows a commanded tilt; copter-heli.parm has it
 FREQUENCIES = np.geomspace(0.3, 400.0, 1500)  # rad/s
 GAINS = np.geomspace(1e-3, 20.0, 400)
 MAX_ANGLE_GAIN = 6.0
 WAY = 6.0  # rad/s, where a control is to turn the aircraft its way
+POWER = 0.5  # of an output, that ArduPilot may count on when it plans how quickly a rate is to change
+MAX_ACCELERATION = 600.0  # deg/s^2 that it plans with at most; copter-heli.parm has it
 LIFT_GAIN = 0.5  # of the loop of vertical acceleration, at frequencies at which the inflow follows
 BLADE_PITCH_RANGE = (0.0, 16.0)  # deg, that the collective stick of ArduPilot has
 FULL = 4500  # H_CYC_MAX: all of the travel
 AXES = {"RLL": (1, "p"), "PIT": (2, "q"), "YAW": (3, "r")}  # column of the axis' control, and its rate
+LETTERS = {"RLL": "R", "PIT": "P", "YAW": "Y"}
+TILTS = {"RLL": ("phi", "v", 1.0), "PIT": ("theta", "u", -1.0)}  # angle, and the velocity that it makes, with its sign
 
 
 class RateLoop(NamedTuple):
-    """Gains of a rate loop of ArduPilot [of full output over rad/s], and what they give."""
+    """Gains of a rate loop of ArduPilot [of full output over rad/s], and what they give.
+
+    `acceleration` is that of a full output [rad/s^2], from the response at `WAY`.
+    """
 
     proportional: float
     integral: float
     angle: float
+    crossover: float
+    gain_margin: float
+    phase_margin: float
+    acceleration: float
+
+
+class VelocityLoop(NamedTuple):
+    """Gains of the loops of horizontal velocity [1/s, 1/s^2, 1] and position [1/s], and what they give."""
+
+    proportional: float
+    integral: float
+    derivative: float
+    position: float
     crossover: float
     gain_margin: float
     phase_margin: float
@@ -70,19 +98,19 @@ def parameter_lines(aircraft: Aircraft, servos: Servos) -> list[str]:
     names = [model.control_names[i] for i in aircraft.axis_controls]
     unit = CYCLIC_TRAVEL * left.gain  # blade pitch of a full output of each axis
     values = _frame(left, right) | _collective(model, left, names[0])
+    margins = f"{20 * math.log10(GAIN_MARGIN):.0f} dB and {math.degrees(PHASE_MARGIN):.0f} deg"
     lines = [
-        f"# {aircraft.name}: ArduPilot's helicopter firmware, dual frame, transverse. Rates: proportional gains for"
+        f"# {aircraft.name}: ArduPilot's helicopter firmware, dual frame, transverse. Proportional gains of rates",
+        f"# and velocity for {margins} at least, in hover.",
     ]
-    lines.append(
-        f"# {20 * math.log10(GAIN_MARGIN):.0f} dB and {math.degrees(PHASE_MARGIN):.0f} deg at least, in hover."
-    )
-    for axis, (column, rate) in AXES.items():
-        loop = rate_loop(model, names[column], rate, unit, FILTERS[axis])
-        lines.append(
-            f"# {rate}: crossover {loop.crossover:.2f} rad/s, gain margin {20 * math.log10(loop.gain_margin):.1f} dB,"
-            f" phase margin {math.degrees(loop.phase_margin):.0f} deg"
-        )
+    rates = {axis: rate_loop(model, names[AXES[axis][0]], AXES[axis][1], unit, FILTERS[axis]) for axis in AXES}
+    tilts = {axis: _tilted(model, names[AXES[axis][0]], axis, unit, rates[axis]) for axis in TILTS}
+    velocity = velocity_loop(list(tilts.values()), aircraft.environment.gravity)
+    for axis, loop in rates.items():
+        lines.append(_margin_line(AXES[axis][1], loop))
         values |= _axis(axis, loop)
+    lines.append(_margin_line("velocity", velocity))
+    values |= _horizontal(velocity)
     return [*lines, *(f"{name:<16} {value:.6g}" for name, value in values.items())]
 
 
@@ -106,10 +134,10 @@ def rate_loop(model: LinearModel, control: str, rate: str, unit: float, filter_f
     ArduPilotError
         The control turns the aircraft the other way, or no gain keeps the margins.
     """
-    response = model.frequency_response(control, rate, FREQUENCIES, DELAY).response * unit
+    response = _rate_response(model, control, rate, unit, filter_frequency)
     if np.interp(WAY, FREQUENCIES, response.imag) > 0.0:  # an integration has a phase of -90 deg
         raise ArduPilotError(f"{control}: turns {rate} the wrong way, see the signs in the servo file")
-    response = response / (1.0 + 1j * FREQUENCIES / (math.tau * filter_frequency))
+    acceleration = WAY * float(np.interp(WAY, FREQUENCIES, np.abs(response)))
     best = None
     for gain in GAINS:
         crossover = _crossover(gain * response)
@@ -122,10 +150,79 @@ def rate_loop(model: LinearModel, control: str, rate: str, unit: float, filter_f
         margins = _margins(loop)
         if margins[0] >= GAIN_MARGIN and margins[1] >= PHASE_MARGIN:
             angle = min(ANGLE * crossover, MAX_ANGLE_GAIN)
-            best = RateLoop(float(gain), float(gain * integral), angle, crossover, *margins)
+            best = RateLoop(float(gain), float(gain * integral), angle, crossover, *margins, acceleration)
     if best is None:
         raise ArduPilotError(f"{control}: no gain on {rate} keeps the margins")
     return best
+
+
+def velocity_loop(tilted: Sequence[NDArray[np.complex128]], gravity: float) -> VelocityLoop:
+    """Gains of the loops of horizontal velocity and position, for the weaker of the axes.
+
+    Parameters
+    ----------
+    tilted : sequence of ndarray
+        Of each axis the velocity [m/s] of a commanded tilt [rad], at `FREQUENCIES`; ArduPilot asks for a tilt of the
+        acceleration that it wants over gravity.
+    gravity : float
+        [m/s^2]
+
+    Raises
+    ------
+    ArduPilotError
+        No gain keeps the margins.
+    """
+    s = 1j * FREQUENCIES
+    low_pass = 1.0 / (1.0 + s / (math.tau * VELOCITY_FILTER))
+    shape = (1.0 + VELOCITY_INTEGRAL / s + VELOCITY_DERIVATIVE * s * low_pass) * low_pass * np.exp(-s * VELOCITY_DELAY)
+    best = None
+    for gain in GAINS:
+        loops = [gain * shape * one / gravity for one in tilted]
+        crossovers = [_crossover(loop) for loop in loops]
+        if None in crossovers:
+            continue
+        gain_margin, phase_margin = (min(values) for values in zip(*map(_margins, loops), strict=True))
+        if gain_margin >= GAIN_MARGIN and phase_margin >= PHASE_MARGIN:
+            crossover = min(one for one in crossovers if one is not None)
+            own = float(gain)
+            gains = own, own * VELOCITY_INTEGRAL, own * VELOCITY_DERIVATIVE, ANGLE * crossover
+            best = VelocityLoop(*gains, crossover, gain_margin, phase_margin)
+    if best is None:
+        raise ArduPilotError("no gain on the velocity keeps the margins")
+    return best
+
+
+def _rate_response(
+    model: LinearModel, control: str, rate: str, unit: float, filter_frequency: float
+) -> NDArray[np.complex128]:
+    """Filtered rate over output, with ArduPilot's delay."""
+    response = model.frequency_response(control, rate, FREQUENCIES, DELAY).response * unit
+    gyro = 1j * FREQUENCIES / (math.tau * GYRO_FILTER)
+    return np.asarray(
+        response / (1.0 + math.sqrt(2.0) * gyro + gyro**2) / (1.0 + 1j * FREQUENCIES / (math.tau * filter_frequency))
+    )
+
+
+def _tilted(model: LinearModel, control: str, axis: str, unit: float, loop: RateLoop) -> NDArray[np.complex128]:
+    """Velocity [m/s] of a tilt that ArduPilot is asked for [rad].
+
+    It shapes what it is asked for, feeds its rate forward, and closes the loop of the angle around that of the rate.
+    """
+    s = 1j * FREQUENCIES
+    open_rate = (loop.proportional + loop.integral / s) * _rate_response(
+        model, control, AXES[axis][1], unit, FILTERS[axis]
+    )
+    open_angle = open_rate * (s + loop.angle)
+    angle, velocity, sign = TILTS[axis]
+    moved = [model.frequency_response(control, name, FREQUENCIES).response for name in (angle, velocity)]
+    return np.asarray(open_angle / (s + open_angle) / (1.0 + SHAPING * s) * sign * moved[1] / moved[0])
+
+
+def _margin_line(name: str, loop: RateLoop | VelocityLoop) -> str:
+    return (
+        f"# {name}: crossover {loop.crossover:.2f} rad/s, gain margin {20 * math.log10(loop.gain_margin):.1f} dB,"
+        f" phase margin {math.degrees(loop.phase_margin):.0f} deg"
+    )
 
 
 def _crossover(loop: NDArray[np.complex128]) -> float | None:
@@ -204,6 +301,7 @@ def _frame(left: Head, right: Head) -> dict[str, float]:
         "ATC_HOVR_ROL_TRM": 0,
         "SCHED_LOOP_RATE": LOOP_RATE,
         "SIM_RATE_HZ": FRAME_RATE,
+        "INS_GYRO_FILTER": GYRO_FILTER,
         "H_RSC_MODE": 2,
         "H_RSC_SETPOINT": 100,
         "H_RSC_RAMP_TIME": 2,
@@ -244,4 +342,12 @@ def _axis(axis: str, loop: RateLoop) -> dict[str, float]:
     values = {f"{rate}P": loop.proportional, f"{rate}I": loop.integral, f"{rate}D": 0.0, f"{rate}FF": 0.0}
     values |= {f"{rate}ILMI": 1.0, f"{rate}IMAX": 1.0}
     values |= {f"{rate}FLTT": FILTERS["RLL"], f"{rate}FLTE": FILTERS[axis], f"{rate}FLTD": 0.0}
-    return values | {angle: loop.angle}
+    planned = min(POWER * math.degrees(loop.acceleration), MAX_ACCELERATION)
+    return values | {angle: loop.angle, f"ATC_ACCEL_{LETTERS[axis]}_MAX": 100.0 * planned}  # centidegrees
+
+
+def _horizontal(loop: VelocityLoop) -> dict[str, float]:
+    """Parameters of horizontal motion."""
+    values = {"PSC_VELXY_P": loop.proportional, "PSC_VELXY_I": loop.integral, "PSC_VELXY_D": loop.derivative}
+    values |= {"PSC_VELXY_FLTE": VELOCITY_FILTER, "PSC_VELXY_FLTD": VELOCITY_FILTER}
+    return values | {"PSC_POSXY_P": loop.position, "ATC_INPUT_TC": SHAPING}

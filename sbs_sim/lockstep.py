@@ -14,6 +14,7 @@ from sbs_sim.ardupilot.servos import Servos
 from sbs_sim.errors import ArduPilotError, SimulationError
 from sbs_sim.flight.simulation import Simulation
 from sbs_sim.flight_loop import IDLE_PERIOD, MAIL_POLL_PERIOD, FlightLoop
+from sbs_sim.sensors.batteries import Batteries
 
 HEARTBEAT = 0.5  # s of wall time between reports while no frame comes
 
@@ -47,8 +48,8 @@ class LockstepLoop(FlightLoop):
         self._pulses: tuple[int, ...] = ()
         self._left = every
         self._last_tick = self._last_report = 0.0
-        environment = simulation.aircraft.environment
-        self._surroundings = environment.gravity, float(simulation.options["ground_altitude"])
+        batteries = Batteries(simulation.aircraft) if simulation.stitched is None else None  # that has no engines
+        self._seen = float(simulation.options["ground_altitude"]), batteries
 
     @property
     def report_steps(self) -> int:
@@ -125,7 +126,7 @@ class LockstepLoop(FlightLoop):
         if moved and not self._fault:
             simulation = self._simulation
             now = (simulation.step - self._start_step) * simulation.step_size
-            self._bridge.answer(state_line(simulation.snapshot(), now, *self._surroundings))
+            self._bridge.answer(state_line(simulation.motion(), now, *self._seen))
         self._left -= 1
         if self._left <= 0 or self._fault:
             self._left, self._last_report = self._every, self._last_tick

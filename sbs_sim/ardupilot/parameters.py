@@ -19,6 +19,7 @@ from sbs_sim.analysis.linear_model import LinearModel
 from sbs_sim.analysis.linearize import linearize
 from sbs_sim.ardupilot.servos import CYCLIC_TRAVEL, FIRST_PULSE, LAST_PULSE, Head, Servos
 from sbs_sim.errors import ArduPilotError
+from sbs_sim.sensors.batteries import Batteries
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,7 @@ TRANSVERSE = "transverse"
 TYPES = dict(zip(("h1", "h3_140", "h3_120", "h4_90", "h4_45"), range(1, 6), strict=True))  # H_SW_TYPE
 HELI_DUAL, TRANSVERSE_MODE = 11, 1
 MOTORS = (33, 34, 35, 36, 37, 38)  # functions of the servos of both swashplates
+ANALOG_BATTERY = 4  # voltage and current; what SITL simulates
 ROTOR_SPEED, ROTOR_SPEED_CHANNEL = 31, 8  # function and servo of the throttle
 
 # Hz; ArduPilot arms if its gyros have at least 1.8 times the rate of its loops.
@@ -97,7 +99,7 @@ def parameter_lines(aircraft: Aircraft, servos: Servos) -> list[str]:
     model = linearize(_with_axes(aircraft, left, right))
     names = [model.control_names[i] for i in aircraft.axis_controls]
     unit = CYCLIC_TRAVEL * left.gain  # blade pitch of a full output of each axis
-    values = _frame(left, right) | _collective(model, left, names[0])
+    values = _frame(left, right) | _collective(model, left, names[0]) | _battery(aircraft)
     margins = f"{20 * math.log10(GAIN_MARGIN):.0f} dB and {math.degrees(PHASE_MARGIN):.0f} deg"
     lines = [
         f"# {aircraft.name}: ArduPilot's helicopter firmware, dual frame, transverse. Proportional gains of rates",
@@ -313,6 +315,14 @@ def _frame(left: Head, right: Head) -> dict[str, float]:
         values |= {f"SERVO{channel}_FUNCTION": function, f"SERVO{channel}_MIN": FIRST_PULSE}
         values |= {f"SERVO{channel}_MAX": LAST_PULSE, f"SERVO{channel}_TRIM": 0.5 * (FIRST_PULSE + LAST_PULSE)}
     return values
+
+
+def _battery(aircraft: Aircraft) -> dict[str, float]:
+    """Parameters of the battery that ArduPilot is shown, where there is one."""
+    batteries = Batteries(aircraft)
+    if not batteries:
+        return {}
+    return {"BATT_MONITOR": ANALOG_BATTERY, "BATT_CAPACITY": 1000.0 * float(batteries.capacity.sum())}  # mA h
 
 
 def _collective(model: LinearModel, head: Head, control: str) -> dict[str, float]:

@@ -117,6 +117,11 @@ class Servos:
     outputs : sequence of Output
     frame : str
 
+    Attributes
+    ----------
+    channel_count : int
+        Channels that a packet must have.
+
     Raises
     ------
     ArduPilotError
@@ -133,6 +138,7 @@ class Servos:
         size = len(self._rest)
         channels = sorted({one for head in heads for one in head.channels} | {one.channel for one in outputs})
         self._channels = np.array(channels, dtype=np.int64) - 1
+        self.channel_count = max(channels, default=0)
         self._factors, self._offset = np.zeros((size, len(channels))), self._rest.copy()
         self._commanded: set[int] = set()
         for head in heads:
@@ -142,11 +148,6 @@ class Servos:
             low, high = one.range
             place, column = _place(rows, one.owner, one.name), channels.index(one.channel)
             self._command([place], [column], np.array([[high - low]]), np.array([low]))
-
-    @property
-    def channel_count(self) -> int:
-        """Channels that a packet must have."""
-        return int(self._channels.max()) + 1 if len(self._channels) else 0
 
     def angles(self, pulses: Sequence[int]) -> Array:
         """Rows of `Aircraft.mix` that pulses [us] command, within their ranges.
@@ -163,12 +164,13 @@ class Servos:
                 f"packet with {len(pulses)} channels: allowed are at least {self.channel_count}, see SERVO_32_ENABLE"
             )
         used = np.array(pulses, dtype=float)[self._channels]
-        travel = (np.clip(used, FIRST_PULSE, LAST_PULSE) - FIRST_PULSE) / (LAST_PULSE - FIRST_PULSE)
+        travel = (np.minimum(np.maximum(used, FIRST_PULSE), LAST_PULSE) - FIRST_PULSE) / (LAST_PULSE - FIRST_PULSE)
         values = self._offset + self._factors @ travel
         if not used.all():
             still = (self._factors[:, used == 0.0] != 0.0).any(axis=1)
             values[still] = self._rest[still]
-        return np.clip(values, *self._limits).reshape(-1, 3)
+        low, high = self._limits  # `np.clip` takes four times as long
+        return np.asarray(np.minimum(np.maximum(values, low), high)).reshape(-1, 3)
 
     def _command(self, places: list[int], columns: list[int], factors: Array, offset: Array) -> None:
         """Let channels command numbers of the rows."""

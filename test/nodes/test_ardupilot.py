@@ -1,9 +1,11 @@
 """ArduPilot's interface with a stand-in that speaks it from its description: packets, servos, lock-step."""
 
+import json
 import math
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,19 +16,27 @@ pytest.importorskip("rclpy")
 from ros_harness import DOMAINS, EXECUTABLES, world
 
 from sbs_msgs.msg import BodyState, ServoFrame
-from sbs_sim import Aircraft
+from sbs_sim import Aircraft, trim
 from sbs_sim.ardupilot.bridge import Bridge
 from sbs_sim.ardupilot.parameters import parameter_lines
-from sbs_sim.ardupilot.protocol import servo_frame
+from sbs_sim.ardupilot.protocol import servo_frame, state_line
 from sbs_sim.ardupilot.servos import Head, Output, Servos
 from sbs_sim.errors import ArduPilotError
 from sbs_sim.flight.contact import state_on_ground
+from sbs_sim.flight.records import Motion
 from sbs_sim.flight.simulation import Simulation
+from sbs_sim.flight.trimmed_state import trimmed_state
 from sbs_sim.lockstep import LockstepLoop
+from sbs_sim.model import state as S
+from sbs_sim.model.frames import rotation_matrix
+from sbs_sim.model.wind import Wind
 from sbs_sim.recording import read
 from sbs_sim.recording.recorded_flight import flight_of
 from sbs_sim.recording.verification import verify
+from sbs_sim.sensors.batteries import Batteries
+from sbs_sim.sensors.truth import range_down, specific_force
 
+ELECTRIC = Path(__file__).resolve().parents[1] / "data" / "electric.yaml"
 REST = [1250] * 6 + [0] * 10  # blades at zero pitch
 
 
@@ -151,6 +161,52 @@ def test_a_frame_is_a_tick_and_sensors_see_an_aircraft_at_rest(flight):
     assert seen["rng_1"] == pytest.approx(0.29, abs=2e-3)  # skids 0.30 m below the c.g., pressed in by 10 mm
 
 
+def test_what_sensors_see_is_what_a_snapshot_has(flight):
+    """Of an aircraft that hangs in its rotors in a wind: the loop has stopped, so its simulation may be looked at."""
+    loop, autopilot = flight
+    loop.set_wind(lambda now: Wind((3.0, -2.0, 0.0)))
+    for _ in range(200):
+        seen = autopilot.frame(transverse(0.02, 0.01, 0.0, 0.60))
+    loop.stop()
+    now = loop._simulation.snapshot()
+    assert seen["imu"]["accel_body"] == pytest.approx(specific_force(now, 9.80665), abs=1e-9)
+    assert seen["imu"]["gyro"] == now.state[10:13].tolist()
+    assert seen["velocity"] == pytest.approx(rotation_matrix(now.state[3:7]) @ now.state[7:10])
+    assert seen["velocity_wind"] == [3.0, -2.0, 0.0]
+    assert seen["rng_1"] == pytest.approx(range_down(now, 0.0))
+    assert "battery" not in seen  # it has none
+
+
+def test_the_battery_loses_the_charge_that_it_gives():
+    """Its voltage falls from 50 to 42 V over a charge of 16 A h, along with the integral of the current."""
+    craft = Aircraft.load(str(ELECTRIC))
+    point = trim(craft, 0.0)
+    simulation = Simulation(
+        craft, trimmed_state(craft, point, (0.0, 0.0, 0.0), 0.0), craft.mix(point.controls), tick=1 / 400
+    )
+    batteries, seen = Batteries(craft), []
+    for _ in range(201):
+        seen.append(json.loads(state_line(simulation.motion(), simulation.time, 0.0, batteries))["battery"])
+        simulation.advance()
+    voltage, current = (np.array([one[name] for one in seen]) for name in ("voltage", "current"))
+    lost = 16.0 * 3600.0 * (voltage[0] - voltage[-1]) / 8.0
+    assert np.trapezoid(current, dx=1 / 400) == pytest.approx(lost, rel=1e-4)
+    # the motor turns at 2400 rpm by 37.7 V of back-EMF: what the rotors take, and its losses, come from the battery
+    power = point.power.sum()
+    assert voltage[0] * current[0] > power
+
+
+def test_of_several_batteries_the_weakest_voltage_and_all_the_current_are_shown():
+    craft = Aircraft.load("quadrotor")  # four of 16.8 to 14 V and 0.45 A h, one for each motor
+    state, rates = np.zeros(craft.layout.size), np.zeros(craft.layout.size)
+    state[S.ATTITUDE] = 1.0
+    for i, (used, share) in enumerate([(0.1, 1.0), (0.5, 2.0), (0.2, 3.0), (0.0, 4.0)]):
+        place = craft.layout.drive(i)["discharge"]
+        state[place], rates[place] = used, share / (0.45 * 3600.0)
+    seen = json.loads(state_line(Motion(state, np.zeros(3), np.zeros(3), rates), 0.0, 0.0, Batteries(craft)))
+    assert seen["battery"] == pytest.approx({"voltage": 15.4, "current": 10.0})
+
+
 def test_what_is_repeated_is_answered_again_and_not_flown_again(flight):
     loop, autopilot = flight
     first = autopilot.frame(REST)
@@ -266,11 +322,37 @@ def test_parameters_say_where_the_servos_are_and_what_margins_the_gains_have(lin
     # blade pitch of 0 and 16 deg on a travel from -8 to 24 deg
     assert (values["H_COL_MIN"], values["H_COL_MAX"]) == (1250, 1750)
     margins = [line for line in lines if "margin" in line and "crossover" in line]
-    assert len(margins) == 3
+    assert len(margins) == 4
     for line in margins:
         decibels, degrees = float(line.split("margin ")[1].split()[0]), float(line.split("margin ")[2].split()[0])
         assert decibels >= 8.0
         assert degrees >= 49.5
+
+
+def test_the_loops_are_nested_and_no_more_is_planned_than_the_controls_can_do(craft, lines):
+    """A loop within another is quicker; a quarter of a second of full yaw gives no more than twice what is planned."""
+    values = parameters(lines)
+    crossovers = {
+        line.split()[1]: float(line.split("crossover ")[1].split()[0]) for line in lines if "crossover" in line
+    }
+    assert values["PSC_POSXY_P"] < crossovers["velocity:"] < min(crossovers["p:"], crossovers["q:"])
+    assert values["PSC_POSXY_P"] == pytest.approx(0.35 * crossovers["velocity:"], rel=0.01)
+    gain = 0.45 * 32.0  # deg of cyclic of a full output
+    left, right = (np.radians([10.0, 0.0, sign * gain]) for sign in (1.0, -1.0))
+    state = state_on_ground(craft, 0.0)
+    state[2] = -20.0
+    simulation = Simulation(craft, state, np.array([left, right]), tick=0.25, ground_altitude=0.0)
+    simulation.advance()
+    reached = abs(math.degrees(simulation.state[12])) / 0.25
+    assert values["ATC_ACCEL_Y_MAX"] / 100.0 < reached
+
+
+def test_an_aircraft_with_a_battery_gets_a_monitor(lines):
+    electric = Aircraft.load(str(ELECTRIC))
+    servos = Servos.load(electric, str(EXAMPLE))
+    values = parameters(parameter_lines(electric, servos))
+    assert (values["BATT_MONITOR"], values["BATT_CAPACITY"]) == (4, 16000)
+    assert "BATT_MONITOR" not in parameters(lines)
 
 
 def test_parameters_of_a_head_that_turns_the_wrong_way_are_refused(craft):

@@ -5,11 +5,14 @@
         --defaults ardupilot/Tools/autotest/default_params/copter-heli.parm
 
 Take-off to 8 m, ten way points with a stop at each, landing; in still air and in 4 m/s of wind. Outside the tests: the
-firmware is built from ArduPilot's sources, by `./waf configure --board sitl` and `./waf heli`. The errors are those of
-the simulation, not of ArduPilot's estimate: it has them too.
+firmware is built from ArduPilot's sources, by `./waf configure --board sitl` and `./waf heli`. Positions are those of
+the simulation. Their distance from ArduPilot's own target, and from its estimate, say what part of the error is its
+control and what part is its estimate; both come from its log. Load is what else the machine does: compare the processor
+time that a frame takes.
 """
 
 import argparse
+import contextlib
 import itertools
 import math
 import os
@@ -28,6 +31,8 @@ BRIDGE = ROOT / "install" / "sbs_sim" / "lib" / "sbs_sim" / "ardupilot"
 HOME = (-35.363262, 149.165237, 584.0)  # deg, deg, m
 POINTS = [(15, 0), (15, 15), (30, 15), (30, -10), (10, -20), (-10, -20), (-10, 0), (-25, 10), (-10, 20), (0, 0)]  # m
 HEIGHT, STOP, SPEED = 8.0, 2.0, 300.0  # m, s at each point, cm/s
+AIRBORNE = 1.0  # m of height from which positions count
+RATE = 400.0  # frames per second
 EARTH = 6378100.0  # m, as ArduPilot has it
 GUIDED, AUTO = 4, 3
 INTERLOCK, COLLECTIVE = 8, 3  # channels
@@ -46,7 +51,8 @@ class Pilot:
         self.link = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", source_system=255, retries=60)
         self.link.wait_heartbeat(timeout=60)
         self.target = self.link.target_system, self.link.target_component
-        self.link.mav.request_data_stream_send(*self.target, self.mav.MAV_DATA_STREAM_ALL, 10, 1)
+        # the state of the estimator alone: ArduPilot waits for a ground station that is slow to read
+        self.link.mav.request_data_stream_send(*self.target, self.mav.MAV_DATA_STREAM_EXTRA3, 2, 1)
 
     def hear(self, seconds, wanted=None):
         """Messages for a while of wall time, up to one that is wanted."""
@@ -128,8 +134,17 @@ class Pilot:
         return False
 
 
+def processor_time(process):
+    """What a process has used until now [s]."""
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def flown(options, wind, folder):
-    """Fly the course in a wind [m/s] from the north; path of the log, and simulated over wall time."""
+    """Fly the course in a wind [m/s] from the north.
+
+    Path of the log, wall time [s], and processor time of the bridge and of ArduPilot [s].
+    """
     parameters, log = folder / "sbs.parm", folder / "flight.mcap"
     environment = {**os.environ, "ROS_DOMAIN_ID": str(options.domain)}
     subprocess.run([sys.executable, BRIDGE, "--parameters", "--out", parameters], check=True, cwd=folder)
@@ -157,34 +172,53 @@ def flown(options, wind, folder):
         bridge = subprocess.Popen([sys.executable, BRIDGE, *ros], stdout=out, stderr=out, cwd=folder, env=environment)
         while "recording" not in (folder / "bridge.log").read_text() and bridge.poll() is None:
             time.sleep(0.1)
+        begun = processor_time(bridge)
         autopilot = subprocess.Popen(firmware, stdout=said, stderr=said, cwd=folder)
         begin = time.monotonic()
         try:
             if not Pilot(options.port).fly():
                 sys.exit(f"the course was not flown: see {folder}")
             elapsed = time.monotonic() - begin
+            used = processor_time(bridge) - begun, processor_time(autopilot)
         finally:
             autopilot.terminate()
             bridge.terminate()
             autopilot.wait()
             bridge.wait()
-    return log, elapsed
+    return log, elapsed, used
 
 
-def departures(log):
-    """Distance of every recorded state in the air from the course [m], and the last time [s]."""
-    state = read(log)["state"]
-    north, east, down = (state[f"position.{axis}"] for axis in "xyz")
-    position = np.stack([north, east], axis=1)
+def departures(state):
+    """Distance of every recorded state from the course [m]."""
+    position = np.stack([state["position.x"], state["position.y"]], axis=1)
     corners = np.array([(0.0, 0.0), *POINTS], dtype=float)
     distances = []
     for begin, end in itertools.pairwise(corners):
         length = np.linalg.norm(end - begin)
         along = np.clip((position - begin) @ (end - begin) / length, 0.0, length)
         distances.append(np.linalg.norm(position - begin - along[:, None] * (end - begin) / length, axis=1))
-    flying = -down > 1.0
-    last = float(state["header.stamp.sec"][-1] + 1e-9 * state["header.stamp.nanosec"][-1])
-    return np.min(distances, axis=0)[flying], last
+    return np.min(distances, axis=0)
+
+
+def own_errors(state, times, folder):
+    """Distance of the simulated positions from ArduPilot's targets and from its estimates [m], where its log has them.
+
+    Both clocks count from its first frame.
+    """
+    from pymavlink import mavutil
+
+    found = {"PSCN": [], "PSCE": []}
+    (path,) = sorted((folder / "logs").glob("*.BIN"))[-1:]
+    reader = mavutil.mavlink_connection(str(path))
+    while (row := reader.recv_match(type=list(found))) is not None:
+        kind = row.get_type()
+        found[kind].append([1e-6 * row.TimeUS, *(getattr(row, f"{name}{kind[-1]}") for name in ("TP", "P"))])
+    north, east = (np.array(rows) for rows in found.values())
+    place = [np.interp(north[:, 0], times, state[f"position.{axis}"]) for axis in "xy"]
+    height = np.interp(north[:, 0], times, -state["position.z"])
+    east = np.stack([np.interp(north[:, 0], east[:, 0], east[:, i]) for i in (1, 2)], axis=1)
+    away = [np.hypot(place[0] - north[:, 1 + i], place[1] - east[:, i]) for i in (0, 1)]
+    return [one[height > AIRBORNE] for one in away]
 
 
 def main() -> None:
@@ -196,14 +230,27 @@ def main() -> None:
     parser.add_argument("--speedup", type=float, default=100.0, help="of ArduPilot (default: 100)")
     parser.add_argument("--port", type=int, default=5760, help="TCP port of ArduPilot (default: 5760)")
     parser.add_argument("--domain", type=int, default=79, help="DDS domain (default: 79)")
+    parser.add_argument("--keep", metavar="FOLDER", help="keep the logs of both sides there")
     options = parser.parse_args()
-    print("wind [m/s]  largest, RMS distance from the course [m]  flight [s]  over real time")
+    print("wind [m/s]  m from course, own target, own estimate, largest and RMS each  flight [s]  over real time")
     for wind in options.winds:
-        with tempfile.TemporaryDirectory(prefix="course-") as name:
-            log, elapsed = flown(options, wind, Path(name))
-            distance, last = departures(log)
-            rms = math.sqrt(float((distance**2).mean()))
-            print(f"{wind:10g}  {distance.max():26.3f}  {rms:12.3f}  {last:10.0f}  {last / elapsed:14.1f}", flush=True)
+        with contextlib.ExitStack() as stack:
+            name = options.keep or stack.enter_context(tempfile.TemporaryDirectory(prefix="course-"))
+            folder = Path(name).resolve() / f"wind_{wind:g}"
+            folder.mkdir(parents=True)
+            log, elapsed, used = flown(options, wind, folder)
+            state = read(log)["state"]
+            times = state["header.stamp.sec"] + 1e-9 * state["header.stamp.nanosec"]
+            frames = RATE * float(times[-1])
+            columns = [departures(state)[-state["position.z"] > AIRBORNE], *own_errors(state, times, folder)]
+            shown = "   ".join(f"{one.max():6.3f} {math.sqrt(float((one**2).mean())):6.3f}" for one in columns)
+            print(f"{wind:10g}  {shown}  {times[-1]:10.0f}  {times[-1] / elapsed:14.1f}")
+            bridge, autopilot = (1e6 * one / frames for one in used)
+            load = os.getloadavg()[0]
+            print(
+                f"            a frame takes {bridge:.0f} us here, {autopilot:.0f} us in ArduPilot; load {load:.1f}",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

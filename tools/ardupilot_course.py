@@ -6,9 +6,9 @@
 
 Take-off to 8 m, ten way points with a stop at each, landing; in still air and in 4 m/s of wind. Outside the tests: the
 firmware is built from ArduPilot's sources, by `./waf configure --board sitl` and `./waf heli`. Positions are those of
-the simulation. Their distance from ArduPilot's own target, and from its estimate, say what part of the error is its
-control and what part is its estimate; both come from its log. Load is what else the machine does: compare the processor
-time that a frame takes.
+the simulation. How far ArduPilot's estimate is from the course, and how far the aircraft is from its target and from
+its estimate, says what part of the error is its control and what part is its estimate; both come from its log. Load is
+what else the machine does: compare the processor time that a frame takes.
 """
 
 import argparse
@@ -31,6 +31,7 @@ BRIDGE = ROOT / "install" / "sbs_sim" / "lib" / "sbs_sim" / "ardupilot"
 HOME = (-35.363262, 149.165237, 584.0)  # deg, deg, m
 POINTS = [(15, 0), (15, 15), (30, 15), (30, -10), (10, -20), (-10, -20), (-10, 0), (-25, 10), (-10, 20), (0, 0)]  # m
 HEIGHT, STOP, SPEED = 8.0, 2.0, 300.0  # m, s at each point, cm/s
+DISTANCES = ("aircraft from course", "estimate from course", "aircraft from target", "aircraft from estimate")
 AIRBORNE = 1.0  # m of height from which positions count
 RATE = 400.0  # frames per second
 EARTH = 6378100.0  # m, as ArduPilot has it
@@ -188,9 +189,9 @@ def flown(options, wind, folder):
     return log, elapsed, used
 
 
-def departures(state):
-    """Distance of every recorded state from the course [m]."""
-    position = np.stack([state["position.x"], state["position.y"]], axis=1)
+def departures(north, east):
+    """Distances from the course [m]."""
+    position = np.stack([north, east], axis=1)
     corners = np.array([(0.0, 0.0), *POINTS], dtype=float)
     distances = []
     for begin, end in itertools.pairwise(corners):
@@ -201,9 +202,10 @@ def departures(state):
 
 
 def own_errors(state, times, folder):
-    """Distance of the simulated positions from ArduPilot's targets and from its estimates [m], where its log has them.
+    """Distances [m] where ArduPilot's log has positions.
 
-    Both clocks count from its first frame.
+    Those of its estimates from the course, and those of the simulated positions from its targets and from its
+    estimates. Both clocks count from its first frame.
     """
     from pymavlink import mavutil
 
@@ -218,7 +220,7 @@ def own_errors(state, times, folder):
     height = np.interp(north[:, 0], times, -state["position.z"])
     east = np.stack([np.interp(north[:, 0], east[:, 0], east[:, i]) for i in (1, 2)], axis=1)
     away = [np.hypot(place[0] - north[:, 1 + i], place[1] - east[:, i]) for i in (0, 1)]
-    return [one[height > AIRBORNE] for one in away]
+    return [one[height > AIRBORNE] for one in (departures(north[:, 2], east[:, 1]), *away)]
 
 
 def main() -> None:
@@ -232,25 +234,28 @@ def main() -> None:
     parser.add_argument("--domain", type=int, default=79, help="DDS domain (default: 79)")
     parser.add_argument("--keep", metavar="FOLDER", help="keep the logs of both sides there")
     options = parser.parse_args()
-    print("wind [m/s]  m from course, own target, own estimate, largest and RMS each  flight [s]  over real time")
     for wind in options.winds:
         with contextlib.ExitStack() as stack:
             name = options.keep or stack.enter_context(tempfile.TemporaryDirectory(prefix="course-"))
             folder = Path(name).resolve() / f"wind_{wind:g}"
             folder.mkdir(parents=True)
-            log, elapsed, used = flown(options, wind, folder)
-            state = read(log)["state"]
-            times = state["header.stamp.sec"] + 1e-9 * state["header.stamp.nanosec"]
-            frames = RATE * float(times[-1])
-            columns = [departures(state)[-state["position.z"] > AIRBORNE], *own_errors(state, times, folder)]
-            shown = "   ".join(f"{one.max():6.3f} {math.sqrt(float((one**2).mean())):6.3f}" for one in columns)
-            print(f"{wind:10g}  {shown}  {times[-1]:10.0f}  {times[-1] / elapsed:14.1f}")
-            bridge, autopilot = (1e6 * one / frames for one in used)
-            load = os.getloadavg()[0]
-            print(
-                f"            a frame takes {bridge:.0f} us here, {autopilot:.0f} us in ArduPilot; load {load:.1f}",
-                flush=True,
-            )
+            report(wind, folder, *flown(options, wind, folder))
+
+
+def report(wind, folder, log, elapsed, used):
+    """Print what a flight was like."""
+    state = read(log)["state"]
+    times = state["header.stamp.sec"] + 1e-9 * state["header.stamp.nanosec"]
+    north, east, height = state["position.x"], state["position.y"], -state["position.z"]
+    last = float(times[-1])
+    bridge, autopilot = (1e6 * one / (RATE * last) for one in used)
+    print(
+        f"wind {wind:g} m/s: {last:.0f} s at {last / elapsed:.1f} times real time; a frame takes {bridge:.0f} us here,"
+        f" {autopilot:.0f} us in ArduPilot; load {os.getloadavg()[0]:.1f}"
+    )
+    distances = [departures(north, east)[height > AIRBORNE], *own_errors(state, times, folder)]
+    for what, one in zip(DISTANCES, distances, strict=True):
+        print(f"  {what:22}  largest {one.max():.3f} m, RMS {math.sqrt(float((one**2).mean())):.3f} m", flush=True)
 
 
 if __name__ == "__main__":

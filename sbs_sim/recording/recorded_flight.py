@@ -30,6 +30,10 @@ IntArray = NDArray[np.int64]
 
 OPTIONS = {"tick": float, "azimuth_step": float, "lead_lag": bool, "cyclic_inflow": bool, "method": str}
 GROUND = "ground_altitude"  # an option too; older logs have none
+FOREIGN = (
+    "the log holds no flight of sbs_sim that can be flown again: aircraft and options are missing, which no topic has."
+    " The simulator writes them into logs of its own (parameter `record`); `ros2 bag` cannot record them"
+)
 WIND_VECTORS = ("velocity", "gust", "turbulence_intensity")
 WIND_NUMBERS = ("gust_delay", "gust_duration", "turbulence_length", "turbulence_airspeed", "turbulence_direction")
 NEWER_NUMBERS = (
@@ -90,6 +94,8 @@ def flight_of(log: Log) -> RecordedFlight:
     log = log.flight()
     if log.recordings > 1:
         raise RecordingError(alike(log.path, log.recordings))
+    if not {"simulation", "versions"} <= log.metadata.keys():
+        raise RecordingError(FOREIGN)
     try:
         simulation, recorded = log.metadata["simulation"], log.metadata["versions"]
         folder = tempfile.TemporaryDirectory(prefix="sbs_sim-")

@@ -342,6 +342,10 @@ def test_a_log_of_another_writer_is_played(tmp_path):
     for topic, (*_, why) in left_out.items():
         assert any(f"{topic}: left out" in line and why in line for line in output.splitlines()), output
     assert "Traceback" not in output
+    refused = replay("--verify", path)
+    assert refused.returncode == 1
+    assert "aircraft and options are missing" in refused.stderr
+    assert "`ros2 bag` cannot record them" in refused.stderr
 
 
 def test_a_depth_that_the_log_does_not_know_is_that_of_state_topics():

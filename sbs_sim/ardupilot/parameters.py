@@ -8,7 +8,7 @@ The loop of horizontal velocity, around those of tilt, is made in the same way, 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +42,7 @@ INTEGRAL, ANGLE = 0.15, 0.35  # of the crossover: integral gain over the proport
 # Of the loop of horizontal velocity: the ratios of ArduPilot's own gains (PSC_VELXY_ 2, 1 and copter-heli.parm's 0.5).
 VELOCITY_INTEGRAL, VELOCITY_DERIVATIVE = 0.5, 0.25  # 1/s, s: over the proportional gain
 VELOCITY_FILTER = 5.0  # Hz, of its error and of the derivative of that, ArduPilot's own
-VELOCITY_DELAY = 1.0 / LOOP_RATE  # s, of the estimate; that of the tilt is in its own loop
+VELOCITY_DELAY = 1.0 / LOOP_RATE  # s, of the loop; its estimate is taken as immediate. The tilt's is in its own loop
 SHAPING = 0.2  # s, time constant with which ArduPilot follows a commanded tilt; copter-heli.parm has it
 FREQUENCIES = np.geomspace(0.3, 400.0, 1500)  # rad/s
 GAINS = np.geomspace(1e-3, 20.0, 400)
@@ -54,7 +54,14 @@ LIFT_GAIN = 0.5  # of the loop of vertical acceleration, at frequencies at which
 BLADE_PITCH_RANGE = (0.0, 16.0)  # deg, that the collective stick of ArduPilot has
 FULL = 4500  # H_CYC_MAX: all of the travel
 AXES = {"RLL": (1, "p"), "PIT": (2, "q"), "YAW": (3, "r")}  # column of the axis' control, and its rate
-LETTERS = {"RLL": "R", "PIT": "P", "YAW": "Y"}
+# Names of newer firmware (ArduPilot's pull requests 31513 and 32192, both in 4.7.0), and its values over the old ones.
+# Each firmware leaves out names that it does not know.
+NEWER = (
+    ("PSC_ACCZ_", "PSC_D_ACC_", 0.1),
+    ("PSC_VELXY_", "PSC_NE_VEL_", 1.0),
+    ("PSC_POSXY_", "PSC_NE_POS_", 1.0),
+    ("ATC_ACCEL_", "ATC_ACC_", 0.01),
+)
 TILTS = {"RLL": ("phi", "v", 1.0), "PIT": ("theta", "u", -1.0)}  # angle, and the velocity that it makes, with its sign
 
 
@@ -113,6 +120,7 @@ def parameter_lines(aircraft: Aircraft, servos: Servos) -> list[str]:
         values |= _axis(axis, loop)
     lines.append(_margin_line("velocity", velocity))
     values |= _horizontal(velocity)
+    values |= _by_newer_names(values)
     return [*lines, *(f"{name:<16} {value:.6g}" for name, value in values.items())]
 
 
@@ -136,10 +144,11 @@ def rate_loop(model: LinearModel, control: str, rate: str, unit: float, filter_f
     ArduPilotError
         The control turns the aircraft the other way, or no gain keeps the margins.
     """
-    response = _rate_response(model, control, rate, unit, filter_frequency)
-    if np.interp(WAY, FREQUENCIES, response.imag) > 0.0:  # an integration has a phase of -90 deg
+    bare = _bare_response(model, control, rate, unit)
+    if np.interp(WAY, FREQUENCIES, bare.imag) > 0.0:  # an integration has a phase of -90 deg
         raise ArduPilotError(f"{control}: turns {rate} the wrong way, see the signs in the servo file")
-    acceleration = WAY * float(np.interp(WAY, FREQUENCIES, np.abs(response)))
+    acceleration = WAY * float(np.interp(WAY, FREQUENCIES, np.abs(bare)))
+    response = _filtered(bare, filter_frequency)
     best = None
     for gain in GAINS:
         crossover = _crossover(gain * response)
@@ -181,7 +190,7 @@ def velocity_loop(tilted: Sequence[NDArray[np.complex128]], gravity: float) -> V
     for gain in GAINS:
         loops = [gain * shape * one / gravity for one in tilted]
         crossovers = [_crossover(loop) for loop in loops]
-        if None in crossovers:
+        if None in crossovers or not all(map(_is_ahead, loops)):
             continue
         gain_margin, phase_margin = (min(values) for values in zip(*map(_margins, loops), strict=True))
         if gain_margin >= GAIN_MARGIN and phase_margin >= PHASE_MARGIN:
@@ -194,15 +203,26 @@ def velocity_loop(tilted: Sequence[NDArray[np.complex128]], gravity: float) -> V
     return best
 
 
-def _rate_response(
-    model: LinearModel, control: str, rate: str, unit: float, filter_frequency: float
-) -> NDArray[np.complex128]:
-    """Filtered rate over output, with ArduPilot's delay."""
-    response = model.frequency_response(control, rate, FREQUENCIES, DELAY).response * unit
+def _bare_response(model: LinearModel, control: str, rate: str, unit: float) -> NDArray[np.complex128]:
+    """Rate over output, with ArduPilot's delay."""
+    return np.asarray(model.frequency_response(control, rate, FREQUENCIES, DELAY).response * unit)
+
+
+def _filtered(response: NDArray[np.complex128], filter_frequency: float) -> NDArray[np.complex128]:
+    """By the filters of the gyros and of the error, the latter of first order [Hz]."""
     gyro = 1j * FREQUENCIES / (math.tau * GYRO_FILTER)
-    return np.asarray(
-        response / (1.0 + math.sqrt(2.0) * gyro + gyro**2) / (1.0 + 1j * FREQUENCIES / (math.tau * filter_frequency))
-    )
+    error = 1.0 + 1j * FREQUENCIES / (math.tau * filter_frequency)
+    return np.asarray(response / (1.0 + math.sqrt(2.0) * gyro + gyro**2) / error)
+
+
+def _by_newer_names(values: Mapping[str, float]) -> dict[str, float]:
+    """Values again, for firmware that calls them otherwise."""
+    return {
+        name.replace(old, new): value * factor
+        for name, value in values.items()
+        for old, new, factor in NEWER
+        if name.startswith(old)
+    }
 
 
 def _tilted(model: LinearModel, control: str, axis: str, unit: float, loop: RateLoop) -> NDArray[np.complex128]:
@@ -211,9 +231,8 @@ def _tilted(model: LinearModel, control: str, axis: str, unit: float, loop: Rate
     It shapes what it is asked for, feeds its rate forward, and closes the loop of the angle around that of the rate.
     """
     s = 1j * FREQUENCIES
-    open_rate = (loop.proportional + loop.integral / s) * _rate_response(
-        model, control, AXES[axis][1], unit, FILTERS[axis]
-    )
+    rate = _filtered(_bare_response(model, control, AXES[axis][1], unit), FILTERS[axis])
+    open_rate = (loop.proportional + loop.integral / s) * rate
     open_angle = open_rate * (s + loop.angle)
     angle, velocity, sign = TILTS[axis]
     moved = [model.frequency_response(control, name, FREQUENCIES).response for name in (angle, velocity)]
@@ -231,6 +250,15 @@ def _crossover(loop: NDArray[np.complex128]) -> float | None:
     """Highest frequency of unit gain [rad/s]; None where there is none."""
     above = np.flatnonzero(np.abs(loop) >= 1.0)
     return None if not len(above) or above[-1] == len(loop) - 1 else float(FREQUENCIES[above[-1]])
+
+
+def _is_ahead(loop: NDArray[np.complex128]) -> bool:
+    """True if the phase, followed from the lowest frequency, is above -180 deg at the last crossover.
+
+    From -270 deg on a loop looks as if it had margins, and is unstable.
+    """
+    last = int(np.flatnonzero(np.abs(loop) >= 1.0)[-1])
+    return bool(np.unwrap(np.angle(loop))[last] > -math.pi)
 
 
 def _margins(loop: NDArray[np.complex128]) -> tuple[float, float]:
@@ -353,7 +381,7 @@ def _axis(axis: str, loop: RateLoop) -> dict[str, float]:
     values |= {f"{rate}ILMI": 1.0, f"{rate}IMAX": 1.0}
     values |= {f"{rate}FLTT": FILTERS["RLL"], f"{rate}FLTE": FILTERS[axis], f"{rate}FLTD": 0.0}
     planned = min(POWER * math.degrees(loop.acceleration), MAX_ACCELERATION)
-    return values | {angle: loop.angle, f"ATC_ACCEL_{LETTERS[axis]}_MAX": 100.0 * planned}  # centidegrees
+    return values | {angle: loop.angle, f"ATC_ACCEL_{axis[0]}_MAX": 100.0 * planned}  # centidegrees
 
 
 def _horizontal(loop: VelocityLoop) -> dict[str, float]:

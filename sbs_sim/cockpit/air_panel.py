@@ -75,7 +75,8 @@ class AirPanel:
             self._gust = [
                 gui.add_number(f"Gust {name.lower()} [m/s]", 0.0, min=-100.0, max=100.0, step=0.5) for name in AXES
             ]
-            self._begin = gui.add_number("Begins after [s or m]", 0.0, min=0.0, max=1e6, step=0.5)
+            hint = "s of a gust over time, m of one over distance; of a file and of a shape alike"
+            self._begin = gui.add_number("Begins after [s or m]", 0.0, min=0.0, max=1e6, step=0.5, hint=hint)
             self._length = gui.add_number("Length [s or m]", 2.0, min=0.0, max=1e6, step=0.5)
             file = gui.add_upload_button(UPLOAD, mime_type=".csv,text/csv", hint="CSV, see set_wind: own_gust_csv")
             file.on_upload(lambda event: self.take_file(event.target.value.name, event.target.value.content))

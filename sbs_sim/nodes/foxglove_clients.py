@@ -112,7 +112,7 @@ class FoxgloveClients:
             fit = Fit(parse(name, definition), short_name(name))
             self._publications[client, channel.id] = publisher, fit
         except SbsError as error:
-            if len(self._refusals) < MAX_PUBLICATIONS:
+            if sum(owner == client for owner, _ in self._refusals) < MAX_PUBLICATIONS:
                 self._refusals[client, channel.id] = error
 
     def unadvertise(self, client: int, channel: int) -> None:

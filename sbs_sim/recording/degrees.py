@@ -80,7 +80,7 @@ class Degrees:
             It is none of the type, or has the most significant byte first.
         """
         if message[1:2] == b"\0":
-            raise RecordingError(f"{self._root}: a message with the least byte first can be converted, this one is not")
+            raise RecordingError(f"{self._root}: only messages with the least significant byte first can be converted")
         if self._layout is None or not self._layout.fits(message):
             self._layout = layout = Layout(self._definitions, self._root, message)
             spans = [span for name, span in layout.doubles.items() if _INDEX.sub("", name) in self.angles]

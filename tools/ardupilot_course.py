@@ -23,6 +23,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 from sbs_sim.recording import read
 
@@ -137,8 +138,8 @@ class Pilot:
 
 def processor_time(process):
     """What a process has used until now [s]."""
-    fields = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    times = psutil.Process(process.pid).cpu_times()
+    return times.user + times.system
 
 
 def flown(options, wind, folder):

@@ -160,7 +160,7 @@ PYTHON = {
     "rosbags": (("rosbags==0.11.9",), ROSBAGS),
     "rerun": (("rerun-sdk==0.41.0",), RERUN),
 }
-PATH_PACKAGES = ("mcap==1.6.0", "mcap-ros2-support-fast==0.8.0", "ros-parser==0.9.0")
+PATH_PACKAGES = (*PYTHON["mcap-ros2-support-fast"][0], "ros-parser==0.9.0")
 PACKAGES = ("@mcap/core@2.2.2", "@foxglove/rosmsg@5.0.5", "@foxglove/rosmsg2-serialization@3.1.0", "fzstd@0.1.1")
 COMMANDS = {"pymcap-cli": ("pymcap-cli==0.34.0", ("info", "doctor"))}  # only looked at for their exit code
 

@@ -9,6 +9,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
+from sbs_sim.recording.degrees import EULER_ANGLES
+
 FOLDER = Path(__file__).resolve().parent.parent / "config" / "layouts"
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b")
 XYZ = ("x", "y", "z")
@@ -17,7 +19,7 @@ ROTORS = (0, 1)
 LIVE = 30  # s of a live flight that Lichtblick shows
 LEGEND, LETTER = 118, 8.5  # pixels of its width that Lichtblick is asked for without text, and for a letter
 ATTITUDE = "Attitude, body to NED [-]"
-ANGLES = "Attitude [deg]", ("roll", "pitch", "heading")  # in its place, of sbs_sim/recording/degrees.py
+ANGLES = "Attitude [deg]"  # in its place
 Curve = tuple[str, str, str]  # path of the field, label, what Foxglove does with it
 DEGREES, PLAIN = ".@degrees", ""
 
@@ -141,10 +143,9 @@ def lichtblick() -> dict:
 
 def readable(plots: Mapping[str, list[Curve]]) -> Iterator[tuple[str, list[Curve]]]:
     """The plots, with roll, pitch and heading in place of the quaternion."""
-    title, angles = ANGLES
     for name, curves in plots.items():
         if name == ATTITUDE:
-            yield title, [(f"/state_deg.attitude_deg.{angle}", angle, PLAIN) for angle in angles]
+            yield ANGLES, [(f"/state_deg.attitude_deg.{angle}", angle, PLAIN) for angle in EULER_ANGLES]
         else:
             yield name, curves
 

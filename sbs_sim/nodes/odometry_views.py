@@ -41,12 +41,14 @@ class PathOf:
         self._poses: deque[PoseStamped] = deque(maxlen=PATH_LENGTH)
         self._last = float("-inf")
 
-    def __call__(self, message: Odometry, late: bool = False) -> Path | None:
-        """Path with this pose, if one is due; who comes late gets it in any case: the flight may be paused."""
+    def late(self, message: Odometry) -> Path:
+        """Path with this pose, due or not, for who comes late: the flight may be paused."""
+        before = self._poses if to_seconds(message.header.stamp) >= self._last else ()
+        return Path(header=message.header, poses=[*before, pose_of(message)])
+
+    def __call__(self, message: Odometry) -> Path | None:
+        """Path with this pose, if one is due."""
         now = to_seconds(message.header.stamp)
-        if late:
-            before = self._poses if now >= self._last else ()
-            return Path(header=message.header, poses=[*before, pose_of(message)])
         if now < self._last:  # another flight
             self._poses.clear()
         elif now < self._last + PATH_PERIOD:

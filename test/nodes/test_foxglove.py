@@ -194,12 +194,12 @@ def test_who_comes_late_gets_the_path_between_two_poses_of_it():
         return path and [pose.pose.position.x for pose in path.poses]
 
     path = PathOf()
-    assert way(path(odometry(1.0), late=True)) == [1.0]
+    assert way(path.late(odometry(1.0))) == [1.0]
     assert way(path(odometry(1.0))) == [1.0]
     assert path(odometry(1.25)) is None
-    assert way(path(odometry(1.25), late=True)) == [1.0, 1.25]
+    assert way(path.late(odometry(1.25))) == [1.0, 1.25]
     assert way(path(odometry(1.5))) == [1.0, 1.5]
-    assert way(path(odometry(0.0), late=True)) == way(path(odometry(0.0))) == [0.0]  # of another flight
+    assert way(path.late(odometry(0.0))) == way(path(odometry(0.0))) == [0.0]  # of another flight
 
 
 def stamp_of(message):

@@ -112,9 +112,11 @@ def parameter_lines(aircraft: Aircraft, servos: Servos) -> list[str]:
         f"# {aircraft.name}: ArduPilot's helicopter firmware, dual frame, transverse. Proportional gains of rates",
         f"# and velocity for {margins} at least, in hover.",
     ]
-    rates = {axis: rate_loop(model, names[AXES[axis][0]], AXES[axis][1], unit, FILTERS[axis]) for axis in AXES}
-    tilts = {axis: _tilted(model, names[AXES[axis][0]], axis, unit, rates[axis]) for axis in TILTS}
-    velocity = velocity_loop(list(tilts.values()), aircraft.environment.gravity)
+    controls = {axis: names[column] for axis, (column, _) in AXES.items()}
+    responses = {axis: _rate_response(model, controls[axis], rate, unit) for axis, (_, rate) in AXES.items()}
+    rates = {axis: rate_loop(responses[axis], controls[axis], rate, FILTERS[axis]) for axis, (_, rate) in AXES.items()}
+    tilts = [_tilted(model, controls[axis], axis, responses[axis], rates[axis]) for axis in TILTS]
+    velocity = velocity_loop(tilts, aircraft.environment.gravity)
     for axis, loop in rates.items():
         lines.append(_margin_line(AXES[axis][1], loop))
         values |= _axis(axis, loop)
@@ -124,18 +126,15 @@ def parameter_lines(aircraft: Aircraft, servos: Servos) -> list[str]:
     return [*lines, *(f"{name:<16} {value:.6g}" for name, value in values.items())]
 
 
-def rate_loop(model: LinearModel, control: str, rate: str, unit: float, filter_frequency: float) -> RateLoop:
+def rate_loop(bare: NDArray[np.complex128], control: str, rate: str, filter_frequency: float) -> RateLoop:
     """Gains of a rate loop.
 
     Parameters
     ----------
-    model : LinearModel
-    control : str
-        Of the axis [rad].
-    rate : str
-        State that is fed back [rad/s].
-    unit : float
-        Control at full output [rad].
+    bare : ndarray
+        Rate [rad/s] over output with ArduPilot's delay, at `FREQUENCIES`.
+    control, rate : str
+        Names of the control of the axis and of the rate that is fed back.
     filter_frequency : float
         Of a low pass of first order on the error [Hz].
 
@@ -144,7 +143,6 @@ def rate_loop(model: LinearModel, control: str, rate: str, unit: float, filter_f
     ArduPilotError
         The control turns the aircraft the other way, or no gain keeps the margins.
     """
-    bare = _bare_response(model, control, rate, unit)
     if np.interp(WAY, FREQUENCIES, bare.imag) > 0.0:  # an integration has a phase of -90 deg
         raise ArduPilotError(f"{control}: turns {rate} the wrong way, see the signs in the servo file")
     acceleration = WAY * float(np.interp(WAY, FREQUENCIES, np.abs(bare)))
@@ -203,7 +201,7 @@ def velocity_loop(tilted: Sequence[NDArray[np.complex128]], gravity: float) -> V
     return best
 
 
-def _bare_response(model: LinearModel, control: str, rate: str, unit: float) -> NDArray[np.complex128]:
+def _rate_response(model: LinearModel, control: str, rate: str, unit: float) -> NDArray[np.complex128]:
     """Rate over output, with ArduPilot's delay."""
     return np.asarray(model.frequency_response(control, rate, FREQUENCIES, DELAY).response * unit)
 
@@ -225,14 +223,15 @@ def _by_newer_names(values: Mapping[str, float]) -> dict[str, float]:
     }
 
 
-def _tilted(model: LinearModel, control: str, axis: str, unit: float, loop: RateLoop) -> NDArray[np.complex128]:
+def _tilted(
+    model: LinearModel, control: str, axis: str, response: NDArray[np.complex128], loop: RateLoop
+) -> NDArray[np.complex128]:
     """Velocity [m/s] of a tilt that ArduPilot is asked for [rad].
 
     It shapes what it is asked for, feeds its rate forward, and closes the loop of the angle around that of the rate.
     """
     s = 1j * FREQUENCIES
-    rate = _filtered(_bare_response(model, control, AXES[axis][1], unit), FILTERS[axis])
-    open_rate = (loop.proportional + loop.integral / s) * rate
+    open_rate = (loop.proportional + loop.integral / s) * _filtered(response, FILTERS[axis])
     open_angle = open_rate * (s + loop.angle)
     angle, velocity, sign = TILTS[axis]
     moved = [model.frequency_response(control, name, FREQUENCIES).response for name in (angle, velocity)]
